@@ -10,6 +10,7 @@ use crate::integrate::cpu::ThreadTime;
 
 use crate::integrate::error::{Error, Reason};
 use crate::integrate::grid::Times;
+use crate::settings::tolerances::times::SAME_TIME;
 use crate::waveform::Waveforms;
 
 /// What stands at the time of a row.
@@ -230,14 +231,15 @@ impl<'a> Sheet<'a> {
         }
     }
 
-    /// Takes the rows that have waited for a row at `t`.
+    /// Takes the rows that have waited for a row at `t`. One at the same time but for rounding is what that row follows, which is read behind it.
     fn take_held(&mut self, t: f64) {
         let due = |held: &mut VecDeque<(f64, RowKind, Vec<f64>)>| match held.front() {
-            Some((at, ..)) if *at <= t => held.pop_front(),
+            Some((at, ..)) if *at <= t + SAME_TIME * t.abs() => held.pop_front(),
             _ => None,
         };
         while let Some((at, kind, row)) = self.held.as_mut().and_then(due) {
-            self.insert(at, &row, kind);
+            let last = self.time.last().copied().unwrap_or(f64::NEG_INFINITY);
+            self.insert(at.min(t).max(last), &row, kind);
         }
     }
 

@@ -409,3 +409,23 @@ fn what_a_leak_decides_right_behind_an_event_is_read() {
     let apart = pairs.fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
     assert!(apart < 1e-4 * 24.0, "{apart} V");
 }
+
+/// A row at the same time as a switching but for rounding is one after it: the rows before and after stand in this order.
+#[test]
+fn rows_of_a_switching_that_falls_on_a_row_are_in_order() {
+    let found = run("passages_on_rows", Method::Auto);
+    assert_eq!(found.method, "theta");
+    let (time, x) = (&found.waveforms.time, column(&found, "v(x)"));
+    assert!(time.is_sorted());
+    // It rises by a line without length at 0.1 us and every 10 us after that, and falls at 4.3 us and every 10 us after that.
+    let steep = (1..time.len()).filter(|&k| (x[k] - x[k - 1]).abs() > 50.0);
+    let steep: Vec<usize> = steep.collect();
+    assert_eq!(steep.len(), 20);
+    for (count, &k) in steep.iter().enumerate() {
+        assert!(time[k] - time[k - 1] < 1e-17, "{} {}", time[k - 1], time[k]);
+        let (period, falls) = ((count / 2) as f64, count % 2 == 1);
+        let expected = 10e-6 * period + if falls { 4.3e-6 } else { 0.1e-6 };
+        assert!((time[k] - expected).abs() < 1e-15, "{} {expected}", time[k]);
+        assert_eq!(x[k] < x[k - 1], falls);
+    }
+}
