@@ -515,3 +515,40 @@ fn an_amplitude_of_zero_has_no_response() {
     let found = small_signal(&model, &SmallSignalOptions::default()).expect("a response");
     assert!(found.phasors.values.iter().all(|v| v.norm() == 0.0));
 }
+
+/// Behind 50 Ω a line of 75 Ω and 10 ns that ends in 100 Ω: Z (Z_L + j Z tan ωτ)/(Z + j Z_L tan ωτ) at its input.
+#[test]
+fn a_transmission_line_is_its_closed_form() {
+    let text = "line\nv1 a 0 ac 1\nr1 a b 50\nt1 b 0 c 0 z0=75 td=10n\nr2 c 0 100\n.ac lin 41 1meg 201meg\n.end\n";
+    let response = response_of(text, &SmallSignalOptions::default());
+    let (z, load) = (Complex::from(75.0), Complex::from(100.0));
+    let input = |f: f64| {
+        let (s, c) = (TAU * f * 10e-9).sin_cos();
+        let seen = z * (load * c + J * z * s) / (z * c + J * load * s);
+        seen / (seen + 50.0)
+    };
+    // Forward and backward waves at the input make the voltage at the end.
+    let output = |f: f64| {
+        let (s, c) = (TAU * f * 10e-9).sin_cos();
+        input(f) / (c + J * z / load * s)
+    };
+    let at = &response.phasors.frequency;
+    assert!(apart(&column(&response, "v(b)"), input, at) < 1e-13);
+    assert!(apart(&column(&response, "v(c)"), output, at) < 1e-13);
+
+    // Two in a row, with ends that cross, are one of both delays.
+    let split = text
+        .replace(
+            "t1 b 0 c 0 z0=75 td=10n",
+            "t1 b 0 m 0 z0=75 td=3n\nt2 c 0 m 0 z0=75 td=7n",
+        )
+        .replace(".end", ".save v(c)\n.end");
+    let response = response_of(&split, &SmallSignalOptions::default());
+    assert!(apart(&column(&response, "v(c)"), output, at) < 1e-13);
+
+    // Open at both ends, it resonates at half a wavelength.
+    let open = "open\ni1 0 b ac 1\nt1 b 0 c 0 z0=75 td=10n\n.ac list 50meg\n.end\n";
+    let model = Model::parse(open, "t.cir").expect("a circuit");
+    let fault = small_signal(&model, &SmallSignalOptions::default()).expect_err("a resonance");
+    assert!(fault.to_string().contains("resonates"), "{fault}");
+}

@@ -4,6 +4,7 @@
 mod beside;
 mod formula;
 mod large;
+mod lines;
 mod measured;
 mod orbit;
 mod ratio;
@@ -255,14 +256,23 @@ pub fn small_signal(model: &Model, options: &SmallSignalOptions<'_>) -> Result<R
         }
         response.about = About::Rest;
     }
+    let probing = match circuit.lines.is_empty() {
+        true => None,
+        false => Some(model.with_circuit(lines::probing(circuit))?),
+    };
+    let probing = probing.as_ref().unwrap_or(model);
     let mut linear = rest::linear(
-        circuit,
-        model.multiport(),
+        probing.circuit(),
+        probing.multiport(),
         &options.settings,
         &mut response.notes,
     )?;
     let drive = drive(circuit, &linear.inputs);
-    response.sweep(&omegas, |omega| linear.response(omega, &drive))?;
+    let ports = lines::ports(probing.circuit(), &linear);
+    response.sweep(&omegas, |omega| match &ports[..] {
+        [] => linear.response(omega, &drive),
+        ports => lines::response(&mut linear, ports, omega, &drive),
+    })?;
     Ok(response)
 }
 

@@ -121,6 +121,9 @@ pub(crate) const LONGEST_SEARCH: f64 = 1e6;
 /// A state takes part in a direction of length 1 by more than this. Larger: names left out; smaller: names of what hardly moves.
 pub(crate) const TAKES_PART: f64 = 0.1;
 
+/// Waves on lines of which rounding may change more than this part are those of a resonance. Larger: a response of rounding; smaller: none close to a resonance.
+pub(crate) const LEAST_KNOWN: f64 = 0.1;
+
 /// A small-signal response of which rounding may leave less than this is told. Larger: wrong digits unsaid; smaller: notes on what rounding does not
 /// do, as its bound is one.
 pub(crate) const LOST: f64 = 1e-6;
