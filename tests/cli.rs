@@ -1526,6 +1526,15 @@ fn lcs_prints_every_format_and_reads_its_json() {
     );
     assert_eq!(run_in(at, "check system.json").status, 0);
     assert_eq!(run_in(at, "op system.json").status, 2);
+    run_in(
+        at,
+        "lcs chopper.cir --switch s1=on --format json -o held.json",
+    );
+    let held = run_in(at, "sim held.json -o held.csv").err;
+    assert!(
+        held.contains("note[switches-stay]") && held.contains("s1=on"),
+        "{held}"
+    );
     fs::write(at.join("broken.json"), "{\"schema\":\"circ-lcs/9\"}").unwrap();
     assert_eq!(run_in(at, "sim broken.json").status, 2);
 }

@@ -503,3 +503,21 @@ fn an_extremum_that_is_reached_twice_is_told_to_have_no_derivative() {
         }
     }
 }
+
+/// The power in a load that matches its source is the greatest there is: no end of the tolerance has as much, and the range holds it.
+#[test]
+fn the_range_about_an_extremum_holds_it() {
+    let text = "matched\nv1 1 0 2\nr1 1 2 1k\nr2 2 0 1k tol=10\n.tran 1u 10u\n.meas tran p avg v(2)*i(r2)\n.end\n";
+    let model = Model::parse(text, "t.cir").expect("a circuit");
+    let range = worst(&model, "p", &WorstOptions::default()).expect("a range");
+    let power = |r2: f64| 4.0 * r2 / ((1e3 + r2) * (1e3 + r2));
+    assert!((range.greatest.value - power(1e3)).abs() < 1e-15);
+    assert_eq!(range.greatest.at[0].1, 1e3);
+    // Which end the derivative, which is rounding, points to is left open; both are below.
+    let ends = [power(900.0), power(1100.0)];
+    assert!(
+        ends.iter()
+            .any(|end| (range.least.value - end).abs() < 1e-15)
+    );
+    assert!(range.notes.iter().any(|note| note.code == "not-straight"));
+}

@@ -478,3 +478,61 @@ fn every_step_is_compared_with_ngspice() {
         "{err}"
     );
 }
+
+/// A value that is set is the one on the card: what its temperature, its model and `m=` make of it stays.
+#[test]
+fn a_value_that_is_set_is_the_cards() {
+    let netlist = "\
+a divider at 77 degrees
+.temp 77
+v1 a 0 1
+r1 a b rm 1k tc1=2m m=2
+.model rm r(r=3)
+r2 b 0 1k
+.meas tran m find v(b) at=1m
+.tran 0.1m 1m
+.end
+";
+    let place = place(netlist);
+    let (status, out, err) = circ(place.path(), "sweep a.cir --param r1=1k,2k -o -");
+    assert_eq!(status, 0, "{err}");
+    let rows: Vec<Vec<f64>> = (out.lines().skip(1))
+        .map(|line| {
+            line.split(',')
+                .take(2)
+                .map(|cell| cell.parse().unwrap())
+                .collect()
+        })
+        .collect();
+    for (row, r1) in rows.iter().zip([1e3, 2e3]) {
+        let expected = 1.0 / (1.0 + r1 * 3.0 * 1.1 / 2.0 / 1e3);
+        assert_eq!(row[0], r1);
+        assert!((row[1] - expected).abs() < 1e-14, "{row:?} {expected}");
+    }
+    assert_eq!(rows.len(), 2);
+}
+
+/// A run that grows beyond the range of numbers is a row that says so.
+#[test]
+fn a_run_that_overflows_is_a_row_with_its_reason() {
+    let netlist = "\
+unstable
+v1 n1 0 1
+r1 n1 a 1
+r2 a 0 -0.5
+c1 a 0 1u ic=0.1
+.meas tran m0 max v(a)
+.tran 10u 1m uic
+.end
+";
+    let place = place(netlist);
+    let (status, out, err) = circ(place.path(), "sweep a.cir --param r1=1,0.25 -o -");
+    assert_eq!(status, 0, "{err}");
+    let rows: Vec<&str> = out.lines().skip(1).collect();
+    assert!(
+        rows[0].contains(",,\"") && rows[0].contains("beyond the range of numbers"),
+        "{out}"
+    );
+    assert!(rows[1].ends_with(','), "{out}");
+    assert!(err.contains("1 of 2 runs failed"), "{err}");
+}

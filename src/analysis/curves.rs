@@ -15,7 +15,8 @@ use crate::settings::tolerances::times::{LAST_ROW, MOST_PERIODS, MOST_STATES};
 /// Values that measurements see of a run at most.
 pub(super) const MOST_VALUES: usize = 4_000_000;
 
-/// What the measurements of a transient see, which begins where the options say. `None` where it is not exact throughout, or rows cost less.
+/// What the measurements of a transient see, which begins where the options say. `None` where it is not exact throughout, or grows beyond the range of
+/// numbers, or rows cost less.
 ///
 /// # Errors
 /// The run's; an exponential does not exist in doubles.
@@ -55,7 +56,9 @@ pub(super) fn transient_curves(
     let mut stretches = course.stretches.iter().rev();
     let last = stretches.find(|stretch| stretch.from < stretch.to);
     let last = last.map_or(tran.tstart, |stretch| stretch.from);
-    curves(&course, &outputs, first.min(last).max(tran.tstart))
+    let found = curves(&course, &outputs, first.min(last).max(tran.tstart))?;
+    // What grows beyond the range of numbers ends the run, and rows tell when.
+    Ok(found.filter(Curves::is_finite))
 }
 
 /// What the measurements of an orbit see, repeated until the end of `.tran`, and a note where that is not all of it.

@@ -29,7 +29,7 @@ pub struct Bound {
     pub estimate: f64,
     /// What a run with these values finds.
     pub value: f64,
-    /// The values there, each at an end of its tolerance.
+    /// The values there: each at an end of its tolerance, or all as they stand.
     pub at: Vec<(String, f64)>,
 }
 
@@ -77,7 +77,7 @@ pub(crate) fn toleranced(
 }
 
 /// The range of what a `.meas` finds while values vary within their tolerances: each value goes to the end to which the derivative points, and a run
-/// with all of them there finds the value. Where the runs differ from the derivatives by more than a tenth of the range, another corner may be worse, and
+/// with all of them there finds the value; the range holds what the values themselves give, too. Where the runs differ from the derivatives by more than a tenth of the range, another corner may be worse, and
 /// a note says so.
 ///
 /// # Errors
@@ -133,15 +133,30 @@ pub fn worst(model: &Model, of: &str, options: &WorstOptions<'_>) -> Result<Wors
             at,
         })
     };
-    let (least, greatest) = (bound(-1.0)?, bound(1.0)?);
+    let (down, up) = (bound(-1.0)?, bound(1.0)?);
     let mut notes = found.notes;
     let bent = |bound: &Bound| (bound.value - bound.estimate).abs() > NOT_STRAIGHT * 2.0 * reach;
-    if bent(&least) || bent(&greatest) {
+    if bent(&down) || bent(&up) {
         let text = format!(
             "`{of}` is no straight function of the values within their tolerances: another corner, or a place between, may be worse"
         );
         notes.push(Note::run("not-straight", text));
     }
+    // About an extremum the values themselves lie outside of both ends.
+    let middle = Bound {
+        estimate: nominal,
+        value: nominal,
+        at: found.at,
+    };
+    let beyond = |first: &Bound, others: [&Bound; 2], side: f64| {
+        let further = |a: &Bound, b: &Bound| side * (b.value - a.value) > 0.0;
+        let found = others
+            .into_iter()
+            .fold(first, |a, b| if further(a, b) { b } else { a });
+        found.clone()
+    };
+    let least = beyond(&down, [&up, &middle], -1.0);
+    let greatest = beyond(&up, [&down, &middle], 1.0);
     Ok(Worst {
         measurement: of.clone(),
         nominal,

@@ -114,10 +114,8 @@ impl<'n> Builder<'n, '_> {
         self.check_args(card, args, &known);
         let args = Args(args);
 
-        let Some(value) = self.passive_value(card, values, args, letter, scope) else {
-            return;
-        };
-        let Some(mut value) = self.at_temperature(value, values, args, scope) else {
+        let Some((mut value, factor)) = self.passive_value(card, values, args, letter, scope)
+        else {
             return;
         };
         if scope == ScopeId::ROOT {
@@ -129,7 +127,24 @@ impl<'n> Builder<'n, '_> {
             value = self
                 .settled(&card.name.text, Some(value), own)
                 .unwrap_or(value);
+        } else if args.get(&["tol"]).is_some() {
+            let message = format!(
+                "`tol` of `{}` in a subcircuit does not count",
+                card.name.text
+            );
+            self.tell(
+                Diagnostic::note("ignored", card.span, message)
+                    .label("tolerances are those of the top level")
+                    .help("samples draw the value where it is written as `{mc(10k, 0.05)}`; `--worst` sees a parameter of the top level that has a tolerance by `--tol-of`"),
+            );
         }
+        let value = match factor {
+            Some(factor) if factor.f64 != 1.0 => Value::binary(value.f64 * factor.f64),
+            _ => value,
+        };
+        let Some(value) = self.at_temperature(value, values, args, scope) else {
+            return;
+        };
         let multiplier = match (
             self.arg(args, &["m"], scope),
             self.arg(args, &["scale"], scope),
@@ -193,7 +208,7 @@ impl<'n> Builder<'n, '_> {
         );
     }
 
-    /// The value of a card: from `R=`, from a number or expression, through a model.
+    /// The value of a card, from `R=`, a number or an expression, else its model's; and what its model multiplies it by.
     fn passive_value(
         &mut self,
         card: &'n ast::Element,
@@ -201,7 +216,7 @@ impl<'n> Builder<'n, '_> {
         args: Args<'n>,
         letter: char,
         scope: ScopeId,
-    ) -> Option<Value> {
+    ) -> Option<(Value, Option<Value>)> {
         let mut value = args.get(&[letter.to_string().as_str(), "value"]);
         let mut model = None;
         for given in values {
@@ -261,17 +276,13 @@ impl<'n> Builder<'n, '_> {
             }
         };
         match (value, factor, model) {
-            (Some(value), None, _) => self.scopes.finite(value, scope),
+            (Some(value), None, _) => Some((self.scopes.finite(value, scope)?, None)),
             (Some(value), Some(factor), _) => {
                 let value = self.scopes.finite(value, scope)?;
                 let factor = self.scopes.finite(factor, scope)?;
-                Some(if factor.f64 == 1.0 {
-                    value
-                } else {
-                    Value::binary(value.f64 * factor.f64)
-                })
+                Some((value, Some(factor)))
             }
-            (None, Some(factor), _) => self.scopes.finite(factor, scope),
+            (None, Some(own), _) => Some((self.scopes.finite(own, scope)?, None)),
             (None, None, Some(model)) => {
                 let message = format!(
                     "`{}` has no value: models by geometry (`{}`) are not supported",

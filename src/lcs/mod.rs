@@ -243,6 +243,13 @@ impl LcsParts {
         self.ports.len()
     }
 
+    /// The switches with the positions that the system is of, as text; empty without switches.
+    pub(crate) fn held_switches(&self) -> String {
+        let held = self.switches.iter();
+        let held = held.map(|(name, on)| format!("{name}={}", if *on { "on" } else { "off" }));
+        held.collect::<Vec<_>>().join(", ")
+    }
+
     /// Number of inputs p.
     #[must_use]
     pub fn p(&self) -> usize {

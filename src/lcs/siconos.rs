@@ -64,14 +64,9 @@ pub fn siconos(lcs: &Lcs, x0: &DVector<f64>, tran: Option<Tran>) -> Result<Strin
         let wave = wave.ok_or_else(|| SiconosError::Wave(input.name.clone()))?;
         let _ = writeln!(sources, "        {wave},  # {}", input.name);
     }
-    let held = lcs
-        .switches
-        .iter()
-        .map(|(name, on)| format!("{name}={}", if *on { "on" } else { "off" }));
-    let held: Vec<String> = held.collect();
-    let held = match held.len() {
-        0 => String::new(),
-        _ => format!("# Switches stay as they are: {}\n", held.join(", ")),
+    let held = match lcs.held_switches() {
+        held if held.is_empty() => held,
+        held => format!("# Switches stay as they are: {held}\n"),
     };
     let step = tran.tmax.unwrap_or(tran.tstep);
     let Outputs {

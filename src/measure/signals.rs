@@ -35,6 +35,12 @@ pub struct Curves {
 }
 
 impl Curves {
+    /// Whether all values are within the range of numbers.
+    #[must_use]
+    pub(crate) fn is_finite(&self) -> bool {
+        self.values.iter().flatten().all(|value| value.is_finite())
+    }
+
     /// So many signals, without a piece yet.
     #[must_use]
     pub const fn of(columns: usize) -> Self {
@@ -356,6 +362,9 @@ mod tests {
         let whole = shifted.over(Over::Integral, 0.0, 10.0).unwrap();
         let exact = 3.0 * (1.0 - 10.0_f64.cos()) + 10.0 + 6.0;
         assert!((whole - exact).abs() < 1e-9);
+        let [before, after] = [(0.0, 4.0), (4.0, 10.0)]
+            .map(|(from, to)| shifted.over(Over::Integral, from, to).unwrap());
+        assert!((before + after - exact).abs() < 1e-9, "{before} {after}");
         let twice = curves.repeated((0, 2), 10.0, 0.0);
         let signals = Signals::Curves(&twice);
         let trace = signals.signal(0).unwrap();

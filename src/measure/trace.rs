@@ -238,7 +238,7 @@ impl<'a> Trace<'a> {
         }
     }
 
-    /// A measure over from ≤ t ≤ to.
+    /// A measure over from ≤ t ≤ to; an impulse at `from` counts in the window before.
     ///
     /// # Errors
     /// [`MeasureError::Window`] where the run has no piece of positive length there.
@@ -252,11 +252,11 @@ impl<'a> Trace<'a> {
         if length.is_nan() || length <= 0.0 {
             return Err(self.outside(from, to));
         }
+        let begin = self.span().map_or(from, |span| span.0);
         let integral = || {
-            let inside = self
-                .impulses
-                .iter()
-                .filter(|(t, _)| (from..=to).contains(t));
+            // Of two windows that meet at an impulse it belongs to the first; that at the begin of all has none before.
+            let inside = (self.impulses.iter())
+                .filter(|(t, _)| *t <= to && (*t > from || *t >= from && from <= begin));
             sum(&|piece| piece.integral()) + inside.map(|(_, area)| area).sum::<f64>()
         };
         // When and how much.

@@ -5,7 +5,7 @@ use crate::analysis::conducting::curved_currents;
 use crate::analysis::curves::{MOST_VALUES, laps, shortest_period, transient_curves};
 use crate::analysis::density::{Cut, bent, crowd};
 use crate::analysis::start::beginning;
-use crate::circuit::{Circuit, Probe, Tran};
+use crate::circuit::{Circuit, Harmonics, Probe, Tran};
 use crate::integrate::{Block, Error, Grid, Method, Note, RowKind, Run, SimOptions};
 use crate::measure::{Curves, Signals};
 use crate::model::Model;
@@ -231,8 +231,8 @@ impl<'a> Measuring<'a> {
             .iter()
             .fold(0.0, |m: f64, v| m.max(v.abs()));
         let least = NOTHING * largest;
-        let coarse = self.found(&some, (0, 1), 0.0).measured;
-        let pairs = found.measured.iter().zip(&coarse);
+        let coarse = self.found(&some, (0, 1), 0.0);
+        let pairs = found.measured.iter().zip(&coarse.measured);
         let both = pairs.filter_map(|(fine, coarse)| {
             let (a, b) = (
                 fine.result.as_ref().ok()?.value,
@@ -241,7 +241,20 @@ impl<'a> Measuring<'a> {
             let larger = a.abs().max(b.abs()).max(least);
             Some((&fine.name[..], [a, b], (a - b).abs() / larger))
         });
-        both.filter(|(.., off)| *off > 0.0).collect()
+        // Of a spectrum the harmonic that is off most, relative to the largest.
+        let pairs = found.harmonics.iter().zip(&coarse.harmonics);
+        let spectra = pairs.filter_map(|(fine, coarse)| {
+            let magnitudes = |of: &Harmonics| -> Option<Vec<f64>> {
+                let spectrum = of.result.as_ref().ok()?;
+                Some(spectrum.harmonics.iter().map(|h| h.magnitude).collect())
+            };
+            let (a, b) = (magnitudes(fine)?, magnitudes(coarse)?);
+            let largest = a.iter().chain(&b).fold(least, |m: f64, v| m.max(*v));
+            let off = |k: usize| (a[k] - b[k]).abs() / largest;
+            let most = (0..a.len()).max_by(|j, k| off(*j).total_cmp(&off(*k)))?;
+            Some((&fine.signal[..], [a[most], b[most]], off(most)))
+        });
+        both.chain(spectra).filter(|(.., off)| *off > 0.0).collect()
     }
 
     /// How often the print step is to be divided for rows that are close enough: twice as many as at events and corners, beside which fewer say nothing;

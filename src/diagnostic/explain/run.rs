@@ -2,7 +2,7 @@
 
 use super::Explanation;
 
-pub(super) const CODES: [Explanation; 62] = [
+pub(super) const CODES: [Explanation; 63] = [
     Explanation::of(
         "about-rest",
         "The response is that about the operating point, as laws are smooth and no switch moves.",
@@ -349,6 +349,12 @@ pub(super) const CODES: [Explanation; 62] = [
         "`uic` on `.tran` starts from initial values; hysteresis (`Vh` in the model), or a resistor and a capacitor in front of the control, lets a switch settle.",
     )
     .shown("takes away its control\nv1 in 0 1\ns1 in out 0 out sm\nr1 out 0 1k\n.model sm sw(vt=-0.5)\n.tran 1u 1m\n"),
+    Explanation::of(
+        "switches-stay",
+        "The switches of the circuit that a system was made of do not move in this run.",
+        "A system has the matrices of one position of the switches, of which `circ lcs --switch NAME=on` chooses another.",
+        "Run the netlist itself where switches are to move.",
+    ),
     Explanation::of(
         "tangents",
         "The response is one about an orbit that is made of steps, along which curved laws are taken for their tangents: it is accurate, not exact.",

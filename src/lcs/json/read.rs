@@ -319,6 +319,16 @@ pub fn read(text: &str) -> Result<SystemFile, JsonError> {
         shift,
         energy,
         outputs,
+        controls: Rows {
+            x: DMatrix::zeros(doc.switches.len(), n),
+            lambda: DMatrix::zeros(doc.switches.len(), m),
+            u: DMatrix::zeros(doc.switches.len(), p),
+            du: DMatrix::zeros(doc.switches.len(), p),
+            one: DVector::zeros(doc.switches.len()),
+        },
+        switches: (doc.switches.iter())
+            .map(|(name, position)| (name.clone(), position == "on"))
+            .collect(),
         ..LcsParts::default()
     })?;
     Ok(SystemFile { lcs, x0, tran })

@@ -46,7 +46,7 @@ fn ideal_devices_become_what_ngspice_has() {
     let deck = deck(&circuit, &options(Realisation::N001)).unwrap();
     insta::assert_snapshot!(format!("{}{}", deck.text, deck.notes.join("\n")), @r"
     * rectifier with a switch
-    v1 in 0 dc 5e0 pulse(0e0 5e0 0e0 4e-10 4e-10 1e-3 2e-3)
+    v1 in 0 dc 0e0 pulse(0e0 5e0 0e0 4e-10 4e-10 1e-3 2e-3)
     v.d1_sense in d1_sense 0
     v.d1_drop d1_sense d1_drop 7e-1
     d1 d1_drop out m.d1
