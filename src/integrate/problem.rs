@@ -118,6 +118,8 @@ pub(super) struct Problem {
     pub(super) start: Place,
     /// See [`start::Initial::conducting`]; empty where not known.
     pub(super) conducting: Vec<bool>,
+    /// See [`start::Initial::at_rest`].
+    pub(super) at_rest: Option<Vec<(f64, f64)>>,
     /// Switches whose start position follows from the start state.
     pub(super) settle: Vec<bool>,
     pub(super) notes: Vec<Note>,
@@ -159,6 +161,7 @@ impl Problem {
                 switches: initial.switches,
             },
             conducting: initial.conducting,
+            at_rest: initial.at_rest,
             settle: switches.map(|s| uic && s.initial.is_none()).collect(),
             notes,
             steps: exact::steps_of(behaviour),
@@ -177,6 +180,16 @@ impl Problem {
         let behaviour = original.standard();
         let mut storage = DVector::zeros(behaviour.storage.len());
         storage.rows_mut(0, x.len()).copy_from(x);
+        let mut notes = vec![Note::run(
+            "not-balanced",
+            "a system without a circuit has no powers to balance: the energies are not computed",
+        )];
+        let held = lcs.held_switches();
+        if !held.is_empty() {
+            let text =
+                format!("switches stay as they are, as a system has one position of them: {held}");
+            notes.push(Note::run("switches-stay", text));
+        }
         Self {
             lines: vec![],
             start: Place {
@@ -185,11 +198,9 @@ impl Problem {
                 switches: vec![],
             },
             conducting: vec![],
+            at_rest: None,
             settle: vec![],
-            notes: vec![Note::run(
-                "not-balanced",
-                "a system without a circuit has no powers to balance: the energies are not computed",
-            )],
+            notes,
             steps: exact::steps_of(&original),
             systems: Systems::of(behaviour),
             free_sources: false,
@@ -204,6 +215,7 @@ impl Problem {
     pub(super) fn with_free_sources(self) -> Self {
         Self {
             free_sources: true,
+            at_rest: None,
             ..self
         }
     }
@@ -230,6 +242,7 @@ impl Problem {
             settle: vec![false; start.switches.len()],
             start,
             conducting,
+            at_rest: None,
             after_edges: true,
             ..self
         }
@@ -301,6 +314,7 @@ impl Problem {
         settings: &Settings,
     ) -> Result<Theta, Error> {
         let systems = self.systems.clone();
+        let at_rest = self.at_rest.clone().filter(|_| place == self.start);
         let mut theta = Theta::new(Setup {
             reduce: Box::new(move |position| systems.free(position)),
             position: place.switches,
@@ -323,6 +337,9 @@ impl Problem {
             theta.pass_silent_corners(&silent);
         }
         theta.expect(&self.conducting);
+        if let Some(points) = at_rest {
+            theta.begin_at_rest(points);
+        }
         Ok(theta)
     }
 
@@ -421,7 +438,7 @@ impl Problem {
                 &settings,
             )
             .ok()?;
-        theta.locate_roughly();
+        theta.scout();
         let mut log = Log::new(0, f64::INFINITY, false);
         for k in 1..=SCOUT_STEPS as u32 {
             // A failure here will be met, and reported, by the run itself.

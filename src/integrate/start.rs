@@ -35,6 +35,8 @@ pub struct Initial {
     pub conducting: Vec<bool>,
     /// The waves that arrive at the two ends of every transmission line, V.
     pub waves: Vec<[f64; 2]>,
+    /// By port of the devices: voltage, V, and current, A, where the circuit rests at its operating point and nothing holds it there.
+    pub(crate) at_rest: Option<Vec<(f64, f64)>>,
     /// Things the user should know.
     pub notes: Vec<Note>,
 }
@@ -448,10 +450,12 @@ pub fn initial(
                     _ => 0.0,
                 }
             }),
+            at_rest: None,
             notes: Vec::new(),
         });
     }
     let point = operating_point(circuit, Values::BeforeZero, true, settings)?;
+    let is_held = !circuit.initial_voltages.is_empty() || !circuit.initial_currents.is_empty();
     let mut notes = point.notes;
     let held: Vec<&str> = circuit
         .initial_currents
@@ -487,6 +491,7 @@ pub fn initial(
             };
             volts(source.p) - volts(source.n)
         }),
+        at_rest: (!is_held).then_some(point.ports),
         notes,
     })
 }

@@ -132,6 +132,14 @@ impl Driver {
         }
     }
 
+    /// Solves for one q near the last one by what costs little; `None` where curved laws need more than that.
+    pub(crate) fn solve_near(&mut self, q: &DVector<f64>) -> Option<Solution> {
+        match &mut self.lawful {
+            Some(lawful) => lawful.solve_near(q),
+            None => Some(self.solve(q)),
+        }
+    }
+
     /// Solves for one q.
     pub fn solve(&mut self, q: &DVector<f64>) -> Solution {
         if let Some(lawful) = &mut self.lawful {

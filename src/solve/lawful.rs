@@ -29,8 +29,8 @@ use super::lcp::{Answered, Scaling, Solution, Status};
 use super::newton::Newton;
 use crate::law::{Law, Resolvent};
 use crate::settings::tolerances::complementarity::{
-    BLOCKED, CONTINUED, CONTINUED_RATIO, DECREASE, MONOTONE, NEWTON_ENDS, NEWTON_SETTLES, PROXIMAL,
-    SMALL_PORT, UNDETERMINED,
+    BLOCKED, CONTINUED, CONTINUED_RATIO, DECREASE, MONOTONE, NEWTON_ENDS, NEWTON_SETTLES, ON_LAWS,
+    PROXIMAL, SMALL_PORT, TERMS_ROUNDING, UNDETERMINED,
 };
 use crate::settings::tolerances::steps::SOLVED;
 
@@ -139,34 +139,49 @@ impl Lawful {
         }
     }
 
+    /// Solves for one q near the last one, by full steps of Newton's method from its solution, which take no memory; `None` where these do not come to an end.
+    pub(super) fn solve_near(&mut self, q: &DVector<f64>) -> Option<Solution> {
+        let q = q.component_mul(&self.scaling.d);
+        let found = self.near(&q)?;
+        Some(self.solution(found, Answered::Newton))
+    }
+
+    fn near(&mut self, q: &DVector<f64>) -> Option<Point> {
+        let mut start = self.w.clone();
+        let parts = (SOLVED, self.tolerance);
+        let found = self.plain.refine(q.as_slice(), start.as_mut_slice(), parts);
+        found.then(|| self.descend(self.at(start, q), q))
+    }
+
     /// Solves for one q.
     pub(super) fn solve(&mut self, q: &DVector<f64>) -> Solution {
         let q = q.component_mul(&self.scaling.d);
-        // Most problems are near the last one, and the plain steps find them without allocation.
-        let mut start = self.w.clone();
-        self.plain
-            .refine(q.as_slice(), start.as_mut_slice(), (SOLVED, self.tolerance));
-        let mut found = self.descend(self.at(start, &q), &q);
         let mut by = Answered::Newton;
-        let mut split = self.at(DVector::zeros(q.len()), &q);
+        let mut found = match self.near(&q) {
+            Some(found) => found,
+            None => self.descend(self.at(self.w.clone(), &q), &q),
+        };
+        let mut split = None;
         for round in 0..ROUNDS {
             if found.size <= self.tolerance {
                 break;
             }
+            let mut from = split.unwrap_or_else(|| self.at(DVector::zeros(q.len()), &q));
             if round > 0 {
                 by = Answered::Splitting;
-                split = self.split(split, &q, SPLITTINGS << round);
+                from = self.split(from, &q, SPLITTINGS << round);
             }
-            let mut next = self.descend(split.clone(), &q);
+            let mut next = self.descend(from.clone(), &q);
             if next.size > self.tolerance {
-                next = self.proximal(split.clone(), &q);
+                next = self.proximal(from.clone(), &q);
             }
             if round == 0 && next.size > self.tolerance {
-                next = self.continued(&split, &q);
+                next = self.continued(&from, &q);
             }
             if next.size < found.size {
                 found = next;
             }
+            split = Some(from);
         }
         self.solution(found, by)
     }
@@ -237,12 +252,41 @@ impl Lawful {
         let before = now.step.norm();
         let mut next = now.clone();
         for _ in 0..chain {
-            next = self.at(&next.w + self.newton_step(&next)?, q);
+            next = self.at(self.moved(&next, &self.newton_step(&next)?), q);
             if next.step.norm() <= (1.0 - DECREASE) * before {
                 return Some(next);
             }
         }
         None
+    }
+
+    /// w after a step. A junction that begins to conduct goes no further than to the current that its line has there, or to the knee of its law: the exponential of a
+    /// voltage that is too high would take a step for every slope on the way back (L. W. Nagel, "SPICE2", Memorandum ERL-M520, 1975).
+    fn moved(&self, from: &Point, step: &DVector<f64>) -> DVector<f64> {
+        let at = |j: usize| {
+            let (port, d, to) = (&self.ports[j], self.scaling.d[j], from.w[j] + step[j]);
+            let Law::Exponential(diode) = &port.law else {
+                return to;
+            };
+            // z = v + ρ i, and i with its slope in z.
+            let (volts, rho, i, slope) = if port.current {
+                (1.0 / d, 1.0 / (d * d), from.lambda[j] * d, from.slope[j])
+            } else {
+                (-d, d * d, from.y[j] / d, from.rest[j])
+            };
+            let rise = step[j] * volts;
+            if rise <= 2.0 * diode.slope {
+                return to;
+            }
+            let expected = (i + slope / rho * rise).max(diode.slope / rho);
+            let limit = diode.slope * (expected / diode.is).ln_1p() + (diode.rs + rho) * expected;
+            if limit < to * volts {
+                limit / volts
+            } else {
+                to
+            }
+        };
+        DVector::from_fn(from.w.len(), |j, _| at(j))
     }
 
     /// The first point on a step, halved again and again, that is nearer to a solution.
@@ -341,7 +385,33 @@ impl Lawful {
                 };
             }
         }
+        if point.size > TERMS_ROUNDING {
+            point.size = point
+                .size
+                .max(self.tolerance / ON_LAWS * self.off_laws(&point));
+        }
         point
+    }
+
+    /// How far y is off the laws, relative to the largest current or voltage of the ports: a residual that is small beside the terms that it is a sum of, as
+    /// voltages across milliohms are that cancel, may be all that a port has.
+    fn off_laws(&self, at: &Point) -> f64 {
+        let (mut largest, mut off) = ([0.0_f64; 2], [0.0_f64; 2]);
+        for (j, port) in self.ports.iter().enumerate() {
+            let d = self.scaling.d[j];
+            let (of_lambda, of_y) = if port.current { (0, 1) } else { (1, 0) };
+            largest[of_lambda] = largest[of_lambda].max((at.lambda[j] * d).abs());
+            largest[of_y] = largest[of_y].max((at.y[j] / d).abs());
+            off[of_y] = off[of_y].max((at.residual[j] / d).abs());
+        }
+        let part = |k: usize| {
+            if off[k] == 0.0 {
+                0.0
+            } else {
+                off[k] / largest[k]
+            }
+        };
+        part(0).max(part(1))
     }
 
     /// −R'⁻¹ R, for M' + μ with a μ that is lost in rounding everywhere but on the kernel of M'.

@@ -10,7 +10,7 @@ use super::lawful::PortLaw;
 use super::lcp::Scaling;
 use crate::law::{Junction, Law, Resolvent};
 use crate::settings::tolerances::complementarity::{
-    CONTRACTS, CONTRACTS_NO_MORE, MONOTONE, ROUNDING_STEPS, RUNAWAY,
+    CONTRACTS, CONTRACTS_NO_MORE, EQUATION_ROUNDING, MONOTONE, ROUNDING_STEPS, RUNAWAY, SMALL_W,
 };
 
 /// Steps from one start; those that need more are better started elsewhere.
@@ -126,8 +126,8 @@ impl Newton {
         }
     }
 
-    /// Solves for one q from a guess of (λ, y), which the solution replaces; the last step is below the part `wanted` of the largest w, or
-    /// below `granted` where rounding lets steps shrink no further. `false`: the steps do not contract, and what is there is no solution.
+    /// Solves for one q from a guess of (λ, y), which the solution replaces; the last step is below the part `wanted` of every w, or
+    /// below the part `granted` of the largest where rounding lets steps shrink no further. `false`: the steps do not contract, and what is there is no solution.
     pub(crate) fn solve(
         &mut self,
         q: &[f64],
@@ -178,6 +178,26 @@ impl Newton {
         }
     }
 
+    /// |dλ| at the solution found last that the rounding of the terms may be which its equations are sums of.
+    pub(crate) fn rounding(&mut self, lambda: &mut [f64]) {
+        lambda.fill(0.0);
+        if !self.factored {
+            return;
+        }
+        for i in 0..self.size {
+            let row = &self.m[i * self.size..(i + 1) * self.size];
+            let terms = row.iter().zip(&self.lambda).map(|(m, l)| (m * l).abs());
+            let terms = terms.sum::<f64>() + self.q[i].abs();
+            self.step.fill(0.0);
+            self.step[i] = EQUATION_ROUNDING * terms;
+            self.substitute();
+            let parts = self.step.iter().zip(&self.slope).zip(&self.d);
+            for (lambda, ((dw, slope), d)) in lambda.iter_mut().zip(parts) {
+                *lambda += (d * slope * dw).abs();
+            }
+        }
+    }
+
     fn descend(&mut self, (wanted, granted): (f64, f64)) -> bool {
         let largest = |values: &[f64]| values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         self.evaluate();
@@ -203,9 +223,17 @@ impl Newton {
             if scale > RUNAWAY * start {
                 return false;
             }
-            let (size, rate) = (wanted * scale, norm / before);
+            let rate = norm / before;
+            // A junction behind an inductor has a w of its own size, whose noise would be the error of the state.
+            let of_port = |(step, w): (&f64, &f64)| step.abs() / w.abs().max(SMALL_W * scale);
+            let own = self
+                .step
+                .iter()
+                .zip(&self.w)
+                .map(of_port)
+                .fold(0.0, f64::max);
             // What is left after this step is a geometric series at most.
-            if norm <= size || k > 0 && rate < CONTRACTS && norm * rate / (1.0 - rate) <= size {
+            if own <= wanted || k > 0 && rate < CONTRACTS && own * rate / (1.0 - rate) <= wanted {
                 return true;
             }
             if rate > ROUNDING_STEPS && norm <= granted * scale {

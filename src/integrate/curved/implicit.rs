@@ -204,6 +204,12 @@ impl Curved {
         }
     }
 
+    /// How far a state of a stage moves where λ move by these, in magnitude.
+    pub(super) fn reach(&self, at: usize, lambda: &[f64], state: usize) -> f64 {
+        let row = &self.steps[at].r[state * self.m..(state + 1) * self.m];
+        row.iter().zip(lambda).map(|(r, l)| (r * l).abs()).sum()
+    }
+
     /// The sum of the magnitudes that a state of a stage is made of, where `right` is as [`Self::prepare`] left it.
     pub(super) fn size(&self, at: usize, right: &[f64], lambda: &[f64], state: usize) -> f64 {
         let Implicit { w, r, .. } = &self.steps[at];

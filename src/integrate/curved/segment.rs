@@ -83,14 +83,48 @@ impl Segment {
 
     /// Hermite's cubic at a part of the step.
     fn cubic(&self, part: f64, state: &mut [f64]) {
-        let (s, r, h) = (part, 1.0 - part, self.end - self.start.t);
-        let (from, out) = (r * r * (1.0 + 2.0 * s), h * s * r * r);
-        let (to, into) = (s * s * (3.0 - 2.0 * s), -h * s * s * r);
-        for (k, state) in state.iter_mut().enumerate() {
-            *state = from * self.start.x[k]
-                + out * self.start.slope[k]
-                + to * self.x[k]
-                + into * self.slope[k];
+        let ends = [
+            (&self.start.x[..], &self.start.slope[..]),
+            (&self.x, &self.slope),
+        ];
+        hermite((part, self.end - self.start.t), ends, state);
+    }
+}
+
+/// The cubic with these values and slopes at both ends, at a part of the length h.
+fn hermite((part, h): (f64, f64), [from, to]: [(&[f64], &[f64]); 2], state: &mut [f64]) {
+    let (s, r) = (part, 1.0 - part);
+    let (begin, out) = (r * r * (1.0 + 2.0 * s), h * s * r * r);
+    let (end, into) = (s * s * (3.0 - 2.0 * s), -h * s * s * r);
+    for (k, state) in state.iter_mut().enumerate() {
+        *state = begin * from.0[k] + out * from.1[k] + end * to.0[k] + into * to.1[k];
+    }
+}
+
+/// The cubic of port j through the stages [`THROUGH`], from values by stage.
+fn through_stages(weights: [f64; 4], values: &[f64], (m, j): (usize, usize)) -> f64 {
+    (weights.iter().zip(THROUGH))
+        .map(|(w, k)| w * values[k * m + j])
+        .sum()
+}
+
+impl Trial {
+    /// State, λ and y at a part of the step from `start`, on the polynomials that rows are read from.
+    pub(crate) fn at_part(
+        &self,
+        start: &Start,
+        part: f64,
+        (x, lambda, y): (&mut [f64], &mut [f64], &mut [f64]),
+    ) {
+        let ends = [
+            (&start.x[..], &start.slope[..]),
+            (&self.x, self.end_slope()),
+        ];
+        hermite((part, self.h), ends, x);
+        let (weights, m) = (interpolation(part), lambda.len());
+        for j in 0..m {
+            lambda[j] = through_stages(weights, &self.lambdas, (m, j));
+            y[j] = through_stages(weights, &self.ys, (m, j));
         }
     }
 }
@@ -275,9 +309,7 @@ impl Segments {
             off.clear();
             off.resize(curved.forms.width(), 0.0);
             for &j in &curved.readings.ports {
-                let polynomial: f64 = (weights.iter().zip(THROUGH))
-                    .map(|(w, k)| w * segment.lambdas[k * m + j])
-                    .sum();
+                let polynomial = through_stages(weights, &segment.lambdas, (m, j));
                 off[n + j] = polynomial - segment.lambdas[tested * m + j];
             }
             curved.readings.are_within(off, reached, within)
@@ -376,9 +408,7 @@ impl Segments {
         segment.cubic(s, &mut self.w[..n]);
         let weights = interpolation(s);
         for &j in &curved.readings.ports {
-            self.w[n + j] = (weights.iter().zip(THROUGH))
-                .map(|(w, k)| w * segment.lambdas[k * m + j])
-                .sum();
+            self.w[n + j] = through_stages(weights, &segment.lambdas, (m, j));
         }
         let u = &mut self.w[n + m..n + m + curved.p];
         inputs.varying_at(t, &mut self.pieces, u);

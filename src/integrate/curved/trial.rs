@@ -350,6 +350,13 @@ impl Trial {
         }
     }
 
+    /// How far states are off at the end because λ is known to the rounding of its equations alone: all that flows may be less than that.
+    pub(crate) fn noise(&mut self, curved: &mut Curved, noise: &mut Vec<f64>) {
+        curved.newton(self.matrices).rounding(&mut self.guess.0);
+        noise.clear();
+        noise.extend((0..self.n).map(|k| curved.reach(self.matrices, &self.guess.0, k)));
+    }
+
     /// Takes what is rounding from the error, and from that of devices what follows it.
     pub(crate) fn forgive(&mut self, curved: &mut Curved, rounding: impl Fn(usize) -> f64) {
         for (k, error) in self.error.iter_mut().enumerate() {

@@ -84,6 +84,8 @@ impl Problem {
                 switches: picked(&self.start.switches, &switches),
             },
             conducting: picked(&self.conducting, &pairs),
+            // Parts are integrated exactly, or not at all.
+            at_rest: None,
             settle: picked(&self.settle, &switches),
             notes: Vec::new(),
             systems: Systems::of(multiport),

@@ -12,6 +12,7 @@ use crate::integrate::control::Verdict;
 use crate::integrate::curved::tableau::GAMMA;
 use crate::integrate::curved::{Curved, Segments, Start as From, Trial, Within};
 use crate::integrate::grow;
+use crate::law::Law;
 use crate::settings::tolerances::steps::{
     CREEPS, CUT, FAINT, GRANT_EMBEDDED, SOLVED, STAGE_SOLVED,
 };
@@ -38,6 +39,8 @@ pub(super) struct Smooth {
     /// Largest |λ| and |y| so far, by port of a system.
     pub(super) sizes: [Vec<f64>; 2],
     sizes_of: Option<usize>,
+    /// See [`Trial::noise`].
+    noise: Vec<f64>,
     /// The stop before which a step was halved, so that coarser runs make another one, s.
     pub(super) halved: f64,
     /// Whether the step is not halved, as a stop cuts it to a small part of the length that the steps before had room for; and the stop, s,
@@ -231,12 +234,19 @@ impl Theta {
             rate.clear();
             rate.resize(lambda.len(), 0.0);
         }
-        // What is small beside the others of its kind is judged by these.
+        // What is small beside the others of its kind, or in its own law, is judged by these.
         let (volts, amperes) = amplitudes.branches();
-        let of_kind = |port: &Port| match port.role {
-            Role::Current => [amperes, volts],
-            Role::Voltage => [volts, amperes],
-            Role::Function => [volts.max(amperes); 2],
+        let of_kind = |port: &Port| {
+            let (own_volts, own_amperes) = match port.law {
+                Law::Exponential(diode) => (diode.slope, diode.is),
+                _ => (0.0, 0.0),
+            };
+            let (volts, amperes) = (volts.max(own_volts), amperes.max(own_amperes));
+            match port.role {
+                Role::Current => [amperes, volts],
+                Role::Voltage => [volts, amperes],
+                Role::Function => [volts.max(amperes); 2],
+            }
         };
         let fresh = smooth.sizes_of != Some(now.system);
         smooth.sizes_of = Some(now.system);
@@ -359,6 +369,7 @@ impl Theta {
         let Smooth {
             trial,
             sizes,
+            noise,
             refused,
             ..
         } = &mut self.smooth;
@@ -396,9 +407,13 @@ impl Theta {
             } else {
                 0.0
             };
-            trial.forgive(curved, |k| match lcs.states[k].unit {
-                "A" => self.rounding[k].max(leakage),
-                _ => self.rounding[k],
+            trial.noise(curved, noise);
+            trial.forgive(curved, |k| {
+                let rounding = self.rounding[k] + noise[k];
+                match lcs.states[k].unit {
+                    "A" => rounding.max(leakage),
+                    _ => rounding,
+                }
             });
             if creeps && trial.error.iter().all(|error| *error == 0.0) {
                 // What a leakage makes of the voltage between junctions that block is none either, for so short a time.

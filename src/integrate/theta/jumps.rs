@@ -14,7 +14,11 @@ impl Theta {
         let mut u = self.inputs.all(self.now.t);
         self.inputs.behind(self.now.t, &mut u);
         let before = std::mem::replace(&mut self.now.u, u);
-        self.jump(&before, log)?;
+        let at_rest = self.at_rest.take().filter(|_| before == self.now.u);
+        match at_rest {
+            None => self.jump(&before, log)?,
+            Some(_) => self.start_anew(),
+        }
         let start = std::mem::take(&mut self.start);
         // Steps that take over at an instant begin with what it brings.
         let reason = if self.now.t > 0.0 && before != self.now.u {
@@ -25,6 +29,9 @@ impl Theta {
         self.note_jump(&start, 0.0, reason, log);
         self.note_energy();
         self.find_mode()?;
+        if let Some(points) = at_rest {
+            self.take_points(&points);
+        }
         self.started = true;
         let Self {
             amplitudes,
@@ -34,6 +41,29 @@ impl Theta {
         } = self;
         amplitudes.see(&plant.systems[now.system].1.lcs, &now.x);
         self.break_waves()
+    }
+
+    /// Smooth laws at the start have these voltages and currents.
+    fn take_points(&mut self, points: &[(f64, f64)]) {
+        let system = &self.plant.systems[self.now.system].1;
+        let is_told = self.is_smooth()
+            && points.len() == system.lcs.m()
+            && system
+                .smooth
+                .as_ref()
+                .is_some_and(|curved| curved.ideal.is_empty());
+        if !is_told {
+            return;
+        }
+        for (j, (port, &(v, i))) in system.lcs.ports.iter().zip(points).enumerate() {
+            (self.lambda[j], self.y[j]) = match port.role {
+                Role::Voltage => (-v, i),
+                Role::Current | Role::Function => (i, -v),
+            };
+        }
+        self.start_from_lambda();
+        // The row there needs no reading on the laws.
+        self.jumped = f64::NEG_INFINITY;
     }
 
     /// At a breakpoint: inputs take their right limits, the state jumps if it must.
@@ -78,11 +108,16 @@ impl Theta {
         self.looks.forget();
     }
 
-    /// The jump from inputs `old` to the present ones at the present time.
-    pub(super) fn jump(&mut self, old: &[f64], log: &mut Log) -> Result<(), Error> {
+    /// What is known of the motion before does not hold any more.
+    fn start_anew(&mut self) {
         self.now.settle = true;
         self.forget_slope();
         self.attempt.h = f64::NAN;
+    }
+
+    /// The jump from inputs `old` to the present ones at the present time.
+    pub(super) fn jump(&mut self, old: &[f64], log: &mut Log) -> Result<(), Error> {
+        self.start_anew();
         let t = self.now.t;
         let x = DVector::from_column_slice(&self.now.x);
         let u = DVector::from_column_slice(&self.now.u);

@@ -82,6 +82,10 @@ pub struct Theta {
     whole: bool,
     /// [`LOCATE`], or [`LOCATE_ROUGHLY`].
     locate: i32,
+    /// See [`Self::scout`].
+    scouts: bool,
+    /// See [`Self::begin_at_rest`].
+    at_rest: Option<Vec<(f64, f64)>>,
     preferred: f64,
     /// See [`Self::read_coarsely`].
     reads_coarsely: bool,
@@ -152,9 +156,16 @@ impl Theta {
         self.whole = true;
     }
 
-    /// Has switchings located to a part of a step that is enough for amplitudes.
-    pub(crate) fn locate_roughly(&mut self) {
-        self.locate = LOCATE_ROUGHLY;
+    /// Has the run find amplitudes alone: switchings are located to a part of a step that is enough for these, and the run ends where Newton's method does not find a stage
+    /// from the one before. Shorter steps have less need of the solvers that always end and cost a hundred times as much.
+    pub(crate) fn scout(&mut self) {
+        (self.scouts, self.locate) = (true, LOCATE_ROUGHLY);
+    }
+
+    /// The run begins at an operating point with these voltages, V, and currents, A, of the ports. Where no edge at the start moves the sources nothing jumps there, whatever a projection on
+    /// ideal laws would make of it, and smooth laws have them at that instant: the voltage of a junction that blocks is not told by its current.
+    pub(crate) fn begin_at_rest(&mut self, points: Vec<(f64, f64)>) {
+        self.at_rest = Some(points);
     }
 
     /// Has λ at an instant read by a longer step, see [`READING`](crate::settings::tolerances::stated::READING), whose error is larger.

@@ -116,8 +116,8 @@ impl Theta {
         Ok(())
     }
 
-    /// The first passage in the trial step to `end`, at whose end guards are beyond zero, and the step up to right behind it: by inverse
-    /// interpolation between the ends of a bracket.
+    /// The first passage in the trial step to `end`, at whose end guards are beyond zero, and the step up to right behind it: first tried where the polynomials
+    /// of the step have it, then by inverse interpolation between the ends of a bracket.
     fn first_passage(&mut self, end: f64) -> Result<End, Error> {
         let t0 = self.smooth.front.t;
         let h = end - t0;
@@ -125,6 +125,7 @@ impl Theta {
         let mut before = (t0, self.guards_at_start());
         let mut beyond = (end, self.smooth.guards.values.clone());
         let (first, last) = (before.1.clone(), beyond.1.clone());
+        let expected = self.expected_passage(before.clone(), beyond.clone());
         let mut third = None;
         let (mut made, mut aside) = (end, finest);
         for count in 1_u32.. {
@@ -132,7 +133,9 @@ impl Theta {
             if width <= 2.0 * finest {
                 break;
             }
-            let wanted = if count % HALVED == 0 {
+            let wanted = if count == 1 {
+                expected - low
+            } else if count % HALVED == 0 {
                 0.5 * width
             } else {
                 crossing(&before, &beyond, third.as_ref()) - low
@@ -169,6 +172,33 @@ impl Theta {
             t: beyond.0,
             passage: uncertain.reduce(f64::max),
         })
+    }
+
+    /// When a guard first passes on the polynomials of the trial step.
+    fn expected_passage(
+        &mut self,
+        mut before: (f64, Vec<f64>),
+        mut beyond: (f64, Vec<f64>),
+    ) -> f64 {
+        let trial = std::mem::take(&mut self.smooth.trial);
+        let (t0, m) = (self.smooth.front.t, self.lambda.len());
+        let (mut x, mut lambda, mut y) = (vec![0.0; trial.x.len()], vec![0.0; m], vec![0.0; m]);
+        for _ in 0..HALVINGS {
+            let t = 0.5 * (before.0 + beyond.0);
+            let part = (t - t0) / trial.h;
+            let point = (&mut x[..], &mut lambda[..], &mut y[..]);
+            trial.at_part(&self.smooth.front, part, point);
+            self.look(t, &x, (&lambda, &y));
+            let passed = if self.passes() {
+                &mut beyond
+            } else {
+                &mut before
+            };
+            passed.0 = t;
+            passed.1.clone_from(&self.smooth.guards.values);
+        }
+        self.smooth.trial = trial;
+        crossing(&before, &beyond, None)
     }
 
     /// The ideal ports of the present system, where they are held.
@@ -210,6 +240,13 @@ impl Theta {
 
     /// Looks at the guards at the end t of the trial step.
     fn look_at_end(&mut self, t: f64) {
+        let trial = std::mem::take(&mut self.smooth.trial);
+        self.look(t, &trial.x, trial.at_end());
+        self.smooth.trial = trial;
+    }
+
+    /// Looks at the guards at a time t, state, λ and y.
+    fn look(&mut self, t: f64, x: &[f64], (lambda, y): (&[f64], &[f64])) {
         if self.ideal().is_empty() && !self.switches.watch() {
             return self.smooth.guards.values.clear();
         }
@@ -217,10 +254,8 @@ impl Theta {
         self.inputs.slopes(t - Self::slack(t), &mut self.du);
         self.inputs.left(t, &mut self.u_next);
         let mut values = std::mem::take(&mut self.smooth.guards.values);
-        let trial = &self.smooth.trial;
-        let (lambda, y) = trial.at_end();
         let at = Point {
-            x: &trial.x,
+            x,
             lambda,
             u: &self.u_next,
             du: &self.du,
@@ -255,6 +290,8 @@ impl Theta {
     }
 }
 
+/// Halvings of a step in which its polynomials are asked: these err by about that part of it.
+const HALVINGS: u32 = 12;
 /// Every so many times a bracket is halved, whatever interpolation says.
 const HALVED: u32 = 4;
 

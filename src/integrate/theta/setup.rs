@@ -162,6 +162,8 @@ impl Theta {
             damped: false,
             whole: false,
             locate: LOCATE,
+            scouts: false,
+            at_rest: None,
             preferred,
             reads_coarsely: false,
             last_h: 0.0,

@@ -147,7 +147,12 @@ impl Theta {
             let q = matrices.q(&self.z);
             matrices.driver.suggest(&self.now.active);
             matrices.driver.suggest_point(&self.lambda, &self.y);
-            let solution = matrices.driver.solve(&q);
+            let solution = if self.scouts {
+                let near = matrices.driver.solve_near(&q);
+                near.ok_or_else(|| Error::at(t0, Reason::Interrupted))?
+            } else {
+                matrices.driver.solve(&q)
+            };
             self.stats.lcp_solves += 1;
             let x = matrices.x_next(&self.z, &solution.lambda);
             if x.iter().any(|v| !v.is_finite()) {

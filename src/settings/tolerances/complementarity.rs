@@ -22,6 +22,20 @@ pub(crate) const NEWTON_ENDS: f64 = 1e-15;
 /// large terms cancel; smaller: steps that change nothing.
 pub(crate) const NEWTON_SETTLES: f64 = 1e-12;
 
+/// A solution is off its laws by no more than this part of the largest current or voltage of all ports, unless that is the rounding of larger terms. Larger: a leakage is
+/// taken for a solution that large terms hide; smaller: solutions that are as good as rounding lets them are refused.
+pub(crate) const ON_LAWS: f64 = 1e-6;
+
+/// A residual of this part of the terms that it is a sum of is their rounding. Larger and smaller as [`ON_LAWS`].
+pub(crate) const TERMS_ROUNDING: f64 = 1e-13;
+
+/// The rounding of an equation in the sum of the magnitudes of its terms. Larger: errors are excused; smaller: steps shrink for rounding, without end where all that flows is leakage.
+pub(crate) const EQUATION_ROUNDING: f64 = 8.0 * f64::EPSILON;
+
+/// A port whose w is below this part of the largest is solved to that part. Larger: noise of junctions that block behind inductors chooses the steps of these; smaller: steps of Newton's method
+/// for what is nothing.
+pub(crate) const SMALL_W: f64 = 1e-9;
+
 /// What counts as small beside the largest quantity: its tolerated residual is this part of that of the largest. Larger: leakage loses
 /// digits; smaller: it decides when Newton ends.
 pub(crate) const SMALL_PORT: f64 = 1e-5;

@@ -130,7 +130,7 @@ pub(crate) const GOES_NOWHERE: f64 = 1e-3;
 
 /// What a row's polynomials may be off at the stages that test them, over the tolerance and the row's amplitude: it adds up with nothing. Larger: rows err more than
 /// steps; smaller: more rows are stepped to.
-pub(crate) const ROWS: f64 = 0.01;
+pub(crate) const ROWS: f64 = 0.04;
 
 /// Switches that sources alone drive are asked so many steps ahead when they move next. Larger: passages far ahead are found again after every
 /// switching; smaller: they are asked at every step.
