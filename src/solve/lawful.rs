@@ -29,8 +29,8 @@ use super::lcp::{Answered, Scaling, Solution, Status};
 use super::newton::Newton;
 use crate::law::{Law, Resolvent};
 use crate::settings::tolerances::complementarity::{
-    BLOCKED, CONTINUED, CONTINUED_RATIO, DECREASE, MONOTONE, NEWTON_ENDS, NEWTON_SETTLES, ON_LAWS,
-    PROXIMAL, SMALL_PORT, TERMS_ROUNDING, UNDETERMINED,
+    BARELY, BLOCKED, CONTINUED, CONTINUED_RATIO, DECREASE, MONOTONE, NEWTON_ENDS, NEWTON_SETTLES,
+    ON_LAWS, PROXIMAL, SMALL_PORT, TERMS_ROUNDING, UNDETERMINED,
 };
 use crate::settings::tolerances::steps::SOLVED;
 
@@ -79,6 +79,8 @@ struct Point {
     /// max_j |R_j| relative to its largest term, what w's rounding makes of them, or [`SMALL_PORT`] of the largest entry of q' or bend
     /// of a law.
     size: f64,
+    /// The same without what [`Lawful::off_laws`] adds.
+    of_terms: f64,
     /// (I + M')⁻¹R.
     step: DVector<f64>,
 }
@@ -305,7 +307,8 @@ impl Lawful {
     }
 
     fn solution(&mut self, at: Point, by: Answered) -> Solution {
-        let solved = at.size <= self.tolerance;
+        // The best that was found may be as good as rounding lets it where nothing but leakage flows.
+        let solved = at.of_terms <= self.tolerance && at.size <= BARELY * self.tolerance;
         let d = &self.scaling.d;
         let zero = self.tolerance * at.lambda.amax().max(at.y.amax());
         let mut active = vec![None; at.w.len()];
@@ -357,6 +360,7 @@ impl Lawful {
             rest: DVector::zeros(size),
             residual: DVector::zeros(0),
             size: 0.0,
+            of_terms: 0.0,
             step: DVector::zeros(0),
             w,
         };
@@ -385,6 +389,7 @@ impl Lawful {
                 };
             }
         }
+        point.of_terms = point.size;
         if point.size > TERMS_ROUNDING {
             point.size = point
                 .size

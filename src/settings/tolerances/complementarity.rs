@@ -26,6 +26,9 @@ pub(crate) const NEWTON_SETTLES: f64 = 1e-12;
 /// taken for a solution that large terms hide; smaller: solutions that are as good as rounding lets them are refused.
 pub(crate) const ON_LAWS: f64 = 1e-6;
 
+/// Where no method comes to [`ON_LAWS`], the best of them serves up to so many times that. Larger: as there; smaller: circuits in which nothing but leakage flows are refused.
+pub(crate) const BARELY: f64 = 100.0;
+
 /// A residual of this part of the terms that it is a sum of is their rounding. Larger and smaller as [`ON_LAWS`].
 pub(crate) const TERMS_ROUNDING: f64 = 1e-13;
 
