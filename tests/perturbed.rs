@@ -3,6 +3,7 @@
 
 use circ::Model;
 use circ::analysis::{About, PeriodicOptions, SmallSignalOptions, periodic_measured, small_signal};
+use circ::settings::Settings;
 use nalgebra::Complex;
 
 /// A circuit with `@value@` where its source has that value at rest.
@@ -153,6 +154,14 @@ const CASES: [Case<'_>; 13] = [
     },
 ];
 
+/// What steps err is not what is compared.
+fn precise() -> Settings {
+    Settings {
+        tol: 1e-6,
+        ..Settings::default()
+    }
+}
+
 impl Case<'_> {
     fn frequency(&self) -> f64 {
         self.cycles as f64 / (self.periods as f64 * self.period)
@@ -177,6 +186,7 @@ impl Case<'_> {
         let model = self.model(|value| format!("dc {value} ac 1"), &sweep);
         let options = SmallSignalOptions {
             about: Some(About::Orbit),
+            settings: precise(),
             ..SmallSignalOptions::default()
         };
         let found = small_signal(&model, &options);
@@ -187,16 +197,24 @@ impl Case<'_> {
     /// The part of the output at the frequency of a sine of this size in the source, in the periodic steady state.
     fn part(&self, size: f64) -> Complex<f64> {
         let (f, length) = (self.frequency(), self.periods as f64 * self.period);
+        // The spectrum of a run in steps is that of its rows.
+        let rows = if self.cards.contains("is=") { 1e4 } else { 1e2 };
         let cards = format!(
             ".tran {:e} {:e}\n.four {:e} {} {}",
-            self.period / 100.0,
+            self.period / rows,
             8.0 * length,
             length.recip(),
             self.cycles,
             self.out
         );
         let model = self.model(|value| format!("sin({value} {size} {f:e} 0 0 0)"), &cards);
-        let found = periodic_measured(&model, &PeriodicOptions::default());
+        let found = periodic_measured(
+            &model,
+            &PeriodicOptions {
+                settings: precise(),
+                ..PeriodicOptions::default()
+            },
+        );
         let (orbit, _, found) = found.unwrap_or_else(|e| panic!("{}: {e}", self.name));
         assert!(
             (orbit.period / length - 1.0).abs() < 1e-12,

@@ -13,7 +13,7 @@ use std::sync::atomic::AtomicBool;
 use nalgebra::DVector;
 
 pub use self::stop::{Checkpoint, SimulationOptions, Stop, StopReason};
-use self::way::Way;
+use self::way::{Lap, Way};
 
 use crate::circuit::{Circuit, Source, Tran, held_at, holder};
 use crate::integrate::Note;
@@ -60,6 +60,8 @@ pub struct Simulation {
     state_jumps: StateJumps,
     notes: Vec<Note>,
     spent: Stats,
+    /// See [`Self::lapping`].
+    lap: Option<Lap>,
 }
 
 impl Simulation {
@@ -72,7 +74,12 @@ impl Simulation {
         multiport: &StaticMultiport,
         options: SimulationOptions,
     ) -> Result<Self, Error> {
-        Self::start(circuit, multiport, options, Problem::with_free_sources)
+        Self::start(
+            circuit,
+            multiport,
+            options,
+            (Problem::with_free_sources, None),
+        )
     }
 
     /// The same of a circuit whose sources keep their waveforms: those that only move switches are then no part of the state. It keeps no energy
@@ -85,14 +92,32 @@ impl Simulation {
         multiport: &StaticMultiport,
         options: SimulationOptions,
     ) -> Result<Self, Error> {
-        Self::start(circuit, multiport, options, Problem::unbalanced)
+        Self::start(circuit, multiport, options, (Problem::unbalanced, None))
+    }
+
+    /// The same of one that comes around again after `span` seconds, over which the steps of curved laws keep the tolerance, relative to the amplitudes of another one that is `like` it and
+    /// those that were seen so far. They end at the times that are asked for, follow from the place that was last gone to alone, and are `most` at most on the way to a time.
+    pub(crate) fn lapping(
+        circuit: &Circuit,
+        multiport: &StaticMultiport,
+        options: SimulationOptions,
+        (span, most): (f64, u64),
+        like: Option<&Self>,
+    ) -> Result<Self, Error> {
+        let lap = Lap {
+            span,
+            most,
+            amplitudes: like.and_then(|like| like.way.amplitudes()),
+        };
+        let problem = (Problem::unbalanced, Some(lap));
+        Self::start(circuit, multiport, options, problem)
     }
 
     fn start(
         circuit: &Circuit,
         multiport: &StaticMultiport,
         options: SimulationOptions,
-        sources: impl FnOnce(Problem) -> Problem,
+        (sources, lap): (impl FnOnce(Problem) -> Problem, Option<Lap>),
     ) -> Result<Self, Error> {
         let tran = transient(circuit.tran, options.until)?;
         check(&tran, &options.as_asked())?;
@@ -100,7 +125,8 @@ impl Simulation {
         let mut problem = sources(problem);
         let lcs = problem.prepare(&tran, &options.settings)?;
         let (mut notes, mut log) = (problem.notes.clone(), Log::default());
-        let way = Way::of(&problem, &lcs, &tran, &options, &mut notes, &mut log)?;
+        let asked = (&options, lap.as_ref());
+        let way = Way::of(&problem, &lcs, &tran, asked, &mut notes, &mut log)?;
         Ok(Self {
             row: vec![0.0; lcs.outputs.names.len()],
             circuit: Arc::new(circuit.clone()),
@@ -113,6 +139,7 @@ impl Simulation {
             state_jumps: log.state_jumps,
             notes,
             spent: Stats::default(),
+            lap,
         })
     }
 
@@ -172,6 +199,9 @@ impl Simulation {
         };
         let mut log = Log::of(0, 0.0, asked);
         log.pause_at_event(pause);
+        if let (Some(lap), Way::Steps(theta)) = (&self.lap, &mut self.way) {
+            theta.make_at_most(lap.most);
+        }
         let advanced = self.way.stepper().advance(t, &mut log);
         let events = self.take(log);
         advanced?;
@@ -232,6 +262,12 @@ impl Simulation {
     #[must_use]
     pub fn state_units(&self) -> &[&'static str] {
         &self.lcs.storage.units
+    }
+
+    /// The tolerance of the steps of [`Self::lapping`].
+    pub(crate) fn lap_tolerance(&self) -> Option<f64> {
+        let steps = self.lap.is_some() && !self.is_exact();
+        steps.then_some(self.options.settings.tol)
     }
 
     /// Whether modes are integrated exactly, with steps at most where that is not possible.
@@ -373,8 +409,12 @@ impl Simulation {
         let mut problem = problem;
         self.lcs = problem.prepare(&self.tran, &self.options.settings)?;
         let mut log = Log::default();
-        let (tran, options, notes) = (&self.tran, &self.options, &mut self.notes);
-        let mut way = Way::of(&problem, &self.lcs, tran, options, notes, &mut log)?;
+        if let Some(lap) = &mut self.lap {
+            lap.amplitudes = self.way.amplitudes();
+        }
+        let (tran, notes) = (&self.tran, &mut self.notes);
+        let asked = (&self.options, self.lap.as_ref());
+        let mut way = Way::of(&problem, &self.lcs, tran, asked, notes, &mut log)?;
         way.carry_on(self.way.balance());
         let outcome = self.way.stepper().finish();
         self.spent.add(&outcome.stats);

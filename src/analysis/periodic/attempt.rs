@@ -5,17 +5,66 @@ use super::search::{Found, Search};
 use super::{PeriodicOptions, none};
 use crate::circuit::{Circuit, Tran};
 use crate::integrate::{Error, Method, Reason, Simulation, SimulationOptions};
-use crate::mna::StaticMultiport;
-use crate::settings::tolerances::periodic::{FINER, LONGEST_SEARCH, PARTS_OF_PERIOD, TABLE_STEPS};
+use crate::mna::{SourcePort, StaticMultiport};
+use crate::settings::Settings;
+use crate::settings::tolerances::periodic::{
+    FINER, FINER_LAP, FINER_TOL, LAP_STEPS, LAP_STEPS_OF_CORNER, LONGEST_SEARCH, ORBIT_TOL,
+    PARTS_OF_PERIOD, TABLE_STEPS,
+};
 
-/// The orbit that a method comes to, and a simulation by it.
+/// What orbits are followed by.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct By {
+    pub(super) method: Method,
+    /// Steps of one length, in place of exact integration and of steps that keep a tolerance.
+    pub(super) equal: bool,
+}
+
+impl By {
+    /// What the plan of the circuit says.
+    pub(super) const PLAN: Self = Self {
+        method: Method::Auto,
+        equal: false,
+    };
+
+    /// Equal steps by this method.
+    pub(super) const fn equal(method: Method) -> Self {
+        Self {
+            method,
+            equal: true,
+        }
+    }
+}
+
+/// What a simulation that shoots does where it is not exact.
+#[derive(Clone, Copy)]
+pub(super) struct Pace<'a> {
+    pub(super) by: By,
+    /// Its steps are those of the orbit that is kept, of a hundredth of the tolerance or half as long.
+    pub(super) finer: bool,
+    /// One of a circuit like this, whose amplitudes its own are taken for.
+    pub(super) like: Option<&'a Simulation>,
+}
+
+impl Pace<'_> {
+    /// That of a first search.
+    pub(super) const fn first(by: By) -> Self {
+        Self {
+            by,
+            finer: false,
+            like: None,
+        }
+    }
+}
+
+/// The orbit that a search comes to, and a simulation that follows it.
 pub(super) fn searched(
     parts: (&Circuit, &StaticMultiport),
     period: &Period,
-    method: Method,
+    by: By,
     options: &PeriodicOptions<'_>,
 ) -> Result<(Simulation, Found), Error> {
-    let mut simulation = simulation(parts, period.seconds, (1.0, method), options)?;
+    let mut simulation = simulation(parts, period.seconds, Pace::first(by), options)?;
     let mut search = Search::of(&mut simulation, options);
     let Some(seconds) = period.seconds else {
         let tran = parts.0.tran.ok_or_else(|| {
@@ -24,7 +73,7 @@ pub(super) fn searched(
         return match search.autonomous(tran.tstop) {
             Ok(found) => Ok((simulation, found)),
             Err(error) if tran.uic && matches!(error.reason, Reason::NoOrbit(_)) => {
-                operating_point(parts, tran, method, options)?.ok_or(error)
+                operating_point(parts, tran, by, options)?.ok_or(error)
             }
             Err(error) => Err(error),
         };
@@ -37,71 +86,96 @@ pub(super) fn searched(
 fn operating_point(
     (circuit, multiport): (&Circuit, &StaticMultiport),
     tran: Tran,
-    method: Method,
+    by: By,
     options: &PeriodicOptions<'_>,
 ) -> Result<Option<(Simulation, Found)>, Error> {
     let circuit = Circuit {
         tran: Some(Tran { uic: false, ..tran }),
         ..circuit.clone()
     };
-    let Ok(mut simulation) = simulation((&circuit, multiport), None, (1.0, method), options) else {
+    let Ok(mut simulation) = simulation((&circuit, multiport), None, Pace::first(by), options)
+    else {
         return Ok(None);
     };
     let found = Search::of(&mut simulation, options).rest_from_here(tran.tstop)?;
     Ok(found.map(|found| (simulation, found)))
 }
 
-/// Where laws are curved: the orbit of steps half as long in place of `found`, and how far the two are apart relative to the amplitudes;
+/// The orbit of finer steps in place of `found`, with the simulation that makes them, and how far the two orbits are apart relative to the amplitudes;
 /// nothing where it is not found.
 pub(super) fn refined(
     parts: (&Circuit, &StaticMultiport),
-    found: &mut Found,
+    (simulation, found): (&mut Simulation, &mut Found),
     period: Option<f64>,
-    method: Method,
+    by: By,
     options: &PeriodicOptions<'_>,
 ) -> Result<Option<f64>, Error> {
-    let mut finer = simulation(parts, period, (FINER, method), options)?;
+    let pace = Pace {
+        by,
+        finer: true,
+        like: Some(simulation),
+    };
+    let mut finer = self::simulation(parts, period, pace, options)?;
     let Some(fixed) = Search::of(&mut finer, options).again(found)? else {
         return Ok(None);
     };
     let both = fixed.stand.state.iter().zip(&found.fixed.stand.state);
     let apart = both.zip(&found.amplitudes);
     let apart = apart.fold(0.0_f64, |m, ((a, b), size)| m.max((a - b).abs() / size));
-    found.fixed = fixed;
+    (found.fixed, *simulation) = (fixed, finer);
     Ok(Some(apart))
 }
 
-/// A simulation that shoots: no rows, an end that is never reached, and where laws are curved, or a method in steps is asked for, steps of `part` of the usual ones.
+/// A simulation that shoots: no rows, and an end that is never reached. Where laws are curved its steps keep a part of the tolerance over a period, unless they are to be
+/// equal; as many of them are made in a period as sources and laws explain.
 pub(super) fn simulation(
     (circuit, multiport): (&Circuit, &StaticMultiport),
     period: Option<f64>,
-    (part, method): (f64, Method),
+    pace: Pace<'_>,
     options: &PeriodicOptions<'_>,
 ) -> Result<Simulation, Error> {
     let span = period.or(circuit.tran.map(|t| t.tstop)).unwrap_or(1.0);
-    let of = |step: Option<f64>| {
+    let Pace { by, finer, like } = pace;
+    let of = |step: Option<f64>, tol: f64| {
         from_rest(searching(circuit.tran, span, LONGEST_SEARCH), |tran| {
             let circuit = Circuit {
                 tran: Some(tran),
                 ..circuit.clone()
             };
             let options = SimulationOptions {
-                method,
+                method: by.method,
                 step,
-                settings: options.settings.clone(),
+                settings: Settings {
+                    tol,
+                    ..options.settings.clone()
+                },
                 ..SimulationOptions::default()
             };
+            if step.is_none() && circuit.is_curved() {
+                let corners = |port: &SourcePort| port.input.source.wave.corners(span);
+                let corners: f64 = multiport.sources.iter().map(corners).sum();
+                let most = LAP_STEPS + LAP_STEPS_OF_CORNER * corners;
+                let most = if finer { FINER_LAP * most } else { most };
+                let most = (most as u64).min(options.settings.max_steps);
+                return Simulation::lapping(&circuit, multiport, options, (span, most), like);
+            }
             Simulation::closed(&circuit, multiport, options)
         })
     };
-    if method == Method::Auto {
-        let simulation = of(None)?;
-        if simulation.is_exact() {
+    if !by.equal {
+        let tol = if finer {
+            FINER_TOL * ORBIT_TOL
+        } else {
+            ORBIT_TOL
+        };
+        let simulation = of(None, tol * options.settings.tol)?;
+        if simulation.is_exact() || circuit.is_curved() {
             return Ok(simulation);
         }
     }
-    // Steps that an error control chooses differ from return to return, and with them what they return to.
-    of(Some(part * span / PARTS_OF_PERIOD))
+    // Where a step is halved, and where not, differs from return to return, and with it what they return to.
+    let part = if finer { FINER } else { 1.0 };
+    of(Some(part * span / PARTS_OF_PERIOD), options.settings.tol)
 }
 
 /// What is asked of runs that look for an orbit, in place of what the circuit asks for itself: they may take `most` spans, s.

@@ -22,10 +22,10 @@ use crate::mna::{StaticMultiport, behaviour};
 use crate::model::Model;
 use crate::settings::Settings;
 use crate::settings::tolerances::periodic::{
-    CLOSED, FINER, MOST_LINEARISED, PARTS_OF_PERIOD, PERIOD_OFF,
+    CLOSED, FINER, MOST_LINEARISED, PARTS_OF_PERIOD, PERIOD_OFF, STEPPED_CLOSED,
 };
 
-use attempt::{refined, searched, simulation};
+use attempt::{By, Pace, refined, searched, simulation};
 pub(super) use large::Large;
 use multipliers::{growth, is_dissipative};
 use rows::{Steps, closing_error, next_to_nothing, notes, rows, state_error};
@@ -108,8 +108,8 @@ pub(super) struct Steady {
     /// What is to be told of the period.
     said: Vec<Note>,
     pub(super) simulation: Simulation,
-    /// By which method it was found.
-    method: Method,
+    /// What it was found by.
+    by: By,
     found: Found,
     /// How far orbits of longer and shorter steps are apart, relative to the amplitudes.
     pub(super) apart: Option<f64>,
@@ -135,7 +135,7 @@ impl Steady {
             held,
             said,
             simulation,
-            method,
+            by,
             found,
             apart,
         } = self;
@@ -143,7 +143,7 @@ impl Steady {
         // Nothing moves, or what leakage and rounding leave does: an error control would look for its digits.
         let still = found.rests || orbit.kind == OrbitKind::Equilibrium && !simulation.is_exact();
         let steps = Steps {
-            method,
+            method: by.method,
             step: still.then_some(FINER * orbit.period / PARTS_OF_PERIOD),
             unestimated: found.rests,
         };
@@ -278,7 +278,11 @@ impl Steady {
         let mut simulation = simulation(
             (&circuit, &multiport),
             Some(seconds),
-            (FINER, self.method),
+            Pace {
+                by: self.by,
+                finer: true,
+                like: Some(&self.simulation),
+            },
             options,
         )?;
         let fixed = Search::of(&mut simulation, options).again(&self.found)?;
@@ -356,7 +360,7 @@ pub(super) fn beside(model: &Model, options: &PeriodicOptions<'_>) -> Result<Sim
     simulation(
         (&circuit, &multiport),
         seconds,
-        (1.0, Method::Auto),
+        Pace::first(By::PLAN),
         options,
     )
 }
@@ -462,28 +466,53 @@ fn whole(asked: Asked, options: &PeriodicOptions<'_>) -> Result<Steady, Error> {
     } = asked;
     let parts = (&circuit, &multiport);
     let mut said = said;
-    let (mut method, mut made) = (
-        Method::Auto,
-        searched(parts, &period, Method::Auto, options),
-    );
-    if let Err(error) = &made
-        && matches!(error.reason, Reason::TooManySteps { .. })
-        && !circuit.is_curved()
-        && let Ok(other) = searched(parts, &period, Method::Theta, options)
-    {
-        let text = format!(
-            "the orbit was found in {PARTS_OF_PERIOD} equal steps a period instead of by exact integration; they damp what swings faster, so that there are no multipliers: {error}"
-        );
-        said.push(Note::run("steps-instead", text));
-        (method, made) = (Method::Theta, Ok(other));
+    let (mut by, mut made) = (By::PLAN, searched(parts, &period, By::PLAN, options));
+    let curved = circuit.is_curved();
+    let equal = By::equal(if curved { Method::Auto } else { Method::Theta });
+    match &made {
+        // A tolerance would have digits of leakage and rounding looked for.
+        Ok((simulation, found)) if found.rests && curved && !simulation.is_exact() => {
+            let other = searched(parts, &period, equal, options);
+            if let Ok((_, Found { rests: true, .. })) = &other {
+                (by, made) = (equal, other);
+            }
+        }
+        Err(error)
+            if !error.is_interruption()
+                && (curved || matches!(error.reason, Reason::TooManySteps { .. })) =>
+        {
+            if let Ok(other) = searched(parts, &period, equal, options) {
+                if !other.1.rests {
+                    let instead = if curved {
+                        "steps that keep a tolerance"
+                    } else {
+                        "exact integration"
+                    };
+                    let text = format!(
+                        "the orbit was found in {PARTS_OF_PERIOD} equal steps a period instead of by {instead}; they damp what swings faster and miss how devices turn off within them, so that there are no multipliers: {error}"
+                    );
+                    said.push(Note::run("steps-instead", text));
+                }
+                (by, made) = (equal, Ok(other));
+            }
+        }
+        _ => {}
     }
-    let (simulation, mut found) = made?;
-    found.underived = method != Method::Auto;
+    let (mut simulation, mut found) = made?;
+    found.underived = by.equal && !(curved && found.rests);
     let apart = if simulation.is_exact() {
         Some(0.0)
     } else {
-        refined(parts, &mut found, period.seconds, method, options)?
+        let coarse = (&mut simulation, &mut found);
+        refined(parts, coarse, period.seconds, by, options)?
     };
+    let closed = options.tol.unwrap_or(STEPPED_CLOSED);
+    if apart.is_none() && found.fixed.residual > closed {
+        let residual = found.fixed.residual;
+        return Err(none(format!(
+            "steps of a tenth of the tolerance close an orbit to {residual:.1e} of its amplitudes, where {closed:e} is asked for, and finer ones none"
+        )));
+    }
     if !simulation.is_exact()
         && !found.underived
         && let Some(growth) = growth(&found.fixed.derivative)
@@ -501,7 +530,7 @@ fn whole(asked: Asked, options: &PeriodicOptions<'_>) -> Result<Steady, Error> {
         held,
         said,
         simulation,
-        method,
+        by,
         found,
         apart,
     })

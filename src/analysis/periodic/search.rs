@@ -5,7 +5,7 @@ use super::multipliers::{growth, multipliers};
 use super::shooting::{Fixed, Return, Shooting, Stand};
 use crate::integrate::{Change, Error, Event, Orbit, OrbitKind, Reason, Simulation, grow};
 use crate::settings::tolerances::periodic::{
-    AT_REST, CLOSED, NEUTRAL, NUDGE, PARTS_FORESEEN, RETURNS, STEPPED_CLOSED,
+    AT_REST, CLOSED, COARSE_CLOSED, NEUTRAL, NUDGE, PARTS_FORESEEN, RETURNS, STEPPED_CLOSED,
 };
 
 /// Periods of transient before each attempt.
@@ -115,7 +115,10 @@ impl<'a, 'o> Search<'a, 'o> {
         } else {
             STEPPED_CLOSED
         };
-        self.options.tol.unwrap_or(usual)
+        let asked = self.options.tol.unwrap_or(usual);
+        // Places between which the choice of a step changes are apart by its error: the orbit is found again in finer ones.
+        let steps = self.simulation.lap_tolerance();
+        steps.map_or(asked, |steps| asked.max(COARSE_CLOSED * steps))
     }
 
     pub(super) fn shooting(&mut self, from: f64, returns: Return) -> Shooting<'_> {
@@ -168,7 +171,10 @@ impl<'a, 'o> Search<'a, 'o> {
         shooting.amplitudes.clone_from(&found.amplitudes);
         shooting.rests = found.rests;
         shooting.corrections = found.fixed.corrections;
-        shooting.solve(found.fixed.stand.clone(), closed)
+        let Fixed {
+            stand, derivative, ..
+        } = &found.fixed;
+        shooting.solve_from(stand.clone(), Some(derivative), closed)
     }
 
     /// Goes a little way from here.

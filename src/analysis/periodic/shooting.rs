@@ -350,19 +350,33 @@ impl Shooting<'_> {
 
     /// Corrects `stand` until the residual falls no more; `None` where it does not come below `closed`.
     pub(super) fn solve(&mut self, stand: Stand, closed: f64) -> Result<Option<Fixed>, Error> {
+        self.solve_from(stand, None, closed)
+    }
+
+    /// The same, first with the M of a flow that is almost this one.
+    pub(super) fn solve_from(
+        &mut self,
+        stand: Stand,
+        known: Option<&DMatrix<f64>>,
+        closed: f64,
+    ) -> Result<Option<Fixed>, Error> {
         let mut stand = stand;
         if stand.state.is_empty() {
             return self.without_states(stand);
         }
         let mut closing = self.close(&stand)?;
-        let mut derivative = self.derivative(&stand, &closing)?;
-        let (mut made_at, mut course) = (closing.size(), closing.passages.take());
+        let (mut derivative, mut made_at) = match known {
+            Some(known) => (known.clone(), f64::INFINITY),
+            None => (self.derivative(&stand, &closing)?, closing.size()),
+        };
+        let mut course = closing.passages.take();
         // M as the last corrections saw it.
         let mut secant = derivative.clone();
         let mut corrections = 0;
         while corrections < MOST_CORRECTIONS && closing.size() > AT_ROUNDING {
             corrections += 1;
             let before = closing.size();
+            let mut old = false;
             match self.corrected(&stand, &closing.residual, &secant)? {
                 Some((next, found)) => {
                     let by = self.parts(&next, &stand);
@@ -376,10 +390,10 @@ impl Shooting<'_> {
                 }
                 None if made_at == before => break,
                 // An old derivative may be the reason.
-                None => made_at = f64::INFINITY,
+                None => old = true,
             }
             let slow = closing.size() > REUSED * before && closing.size() > closed;
-            if slow || made_at == f64::INFINITY {
+            if slow || old {
                 derivative = self.derivative(&stand, &closing)?;
                 secant.clone_from(&derivative);
                 (made_at, course) = (closing.size(), closing.passages.take());
@@ -462,7 +476,8 @@ impl Shooting<'_> {
             return Ok(None);
         };
         let mut part = 1.0;
-        let tries = if residual.amax() > ROUNDING_OF_RETURN {
+        let rounding = self.simulation.lap_tolerance();
+        let tries = if residual.amax() > rounding.unwrap_or(ROUNDING_OF_RETURN) {
             HALVINGS
         } else {
             1

@@ -2,13 +2,14 @@
 
 use std::path::Path;
 
+use super::attempt::{By, Pace};
 use super::multipliers::{growth, is_dissipative};
 use super::rows::closing_error;
 use super::search::Search;
 use super::shooting::Return;
 use super::{PeriodicOptions, period, simulation, steady};
 use crate::circuit::ElaborateOptions;
-use crate::integrate::{Method, Run};
+use crate::integrate::Run;
 use crate::mna::behaviour;
 use crate::model::Model;
 
@@ -47,8 +48,8 @@ fn the_variational_equation_agrees_with_differences() {
         let multiport = behaviour(&circuit).expect("a multiport");
         let seconds = period.seconds.expect("a driven circuit");
         let parts = (&circuit, &multiport);
-        let mut simulation =
-            simulation(parts, period.seconds, (1.0, Method::Auto), &options).expect("a simulation");
+        let mut simulation = simulation(parts, period.seconds, Pace::first(By::PLAN), &options)
+            .expect("a simulation");
         let mut search = Search::of(&mut simulation, &options);
         let found = search.driven(seconds, period.from).expect("an orbit");
         let mut shooting = search.shooting(found.from, Return::After(seconds));

@@ -3,6 +3,7 @@
 use super::SimulationOptions;
 use crate::circuit::Tran;
 use crate::integrate::Note;
+use crate::integrate::control::Amplitudes;
 use crate::integrate::energy::Balance;
 use crate::integrate::error::{Error, Reason};
 use crate::integrate::exact::Place;
@@ -17,6 +18,17 @@ use crate::lcs::Lcs;
 use crate::plan::{not_exact, plan};
 use crate::settings::tolerances::steps::HANDOVER_STEPS;
 
+/// What a simulation comes around to again and again: steps whose lengths are chosen keep the tolerance over it.
+#[derive(Debug, Clone)]
+pub(super) struct Lap {
+    /// s.
+    pub(super) span: f64,
+    /// Steps on the way to a time at most.
+    pub(super) most: u64,
+    /// Those seen so far.
+    pub(super) amplitudes: Option<Amplitudes>,
+}
+
 /// The stepper of a simulation.
 pub(super) enum Way {
     Exact(Box<Handover>),
@@ -29,7 +41,7 @@ impl Way {
         problem: &Problem,
         lcs: &Lcs,
         tran: &Tran,
-        options: &SimulationOptions,
+        (options, lap): (&SimulationOptions, Option<&Lap>),
         notes: &mut Vec<Note>,
         log: &mut Log<'_>,
     ) -> Result<Self, Error> {
@@ -54,7 +66,7 @@ impl Way {
             }
             *log = Log::default();
         }
-        let mut theta = steps(problem, tran, plan.scheme, options)?;
+        let mut theta = steps(problem, tran, plan.scheme, (options, lap))?;
         theta.advance(start, log)?;
         Ok(Self::Steps(Box::new(theta)))
     }
@@ -77,6 +89,14 @@ impl Way {
         match self {
             Self::Exact(exact) => exact.balance(),
             Self::Steps(theta) => theta.balance(),
+        }
+    }
+
+    /// The amplitudes that steps have seen so far.
+    pub(super) fn amplitudes(&self) -> Option<Amplitudes> {
+        match self {
+            Self::Exact(_) => None,
+            Self::Steps(theta) => Some(theta.amplitudes_of_ports()),
         }
     }
 
@@ -116,10 +136,25 @@ fn steps(
     problem: &Problem,
     tran: &Tran,
     scheme: Scheme,
-    options: &SimulationOptions,
+    (options, lap): (&SimulationOptions, Option<&Lap>),
 ) -> Result<Theta, Error> {
-    let stepping = options.step.map_or(controlled(tran), Stepping::Fixed);
     let settings = &options.settings;
+    if let Some(Lap {
+        span, amplitudes, ..
+    }) = lap
+    {
+        let tran = Tran {
+            tstop: *span,
+            ..*tran
+        };
+        let start = problem.start.clone();
+        let mut theta = problem.stepper(start, &tran, scheme, controlled(&tran), settings)?;
+        if let Some(amplitudes) = amplitudes {
+            theta.expect_amplitudes(amplitudes.clone());
+        }
+        return Ok(theta);
+    }
+    let stepping = options.step.map_or(controlled(tran), Stepping::Fixed);
     let mut theta = problem.stepper(problem.start.clone(), tran, scheme, stepping, settings)?;
     theta.move_by_hand();
     if options.step.is_none()

@@ -60,11 +60,12 @@ impl Theta {
         if self.now.t < stop || log.pauses() && switched {
             return Ok(());
         }
-        let mut moving = std::mem::take(&mut self.smooth.ahead.moving);
         let at_passage = early || (passage - stop).abs() <= Self::slack(stop);
-        if !at_passage {
-            moving.clear();
-        }
+        let mut moving = if at_passage {
+            std::mem::take(&mut self.smooth.ahead.moving)
+        } else {
+            Vec::new()
+        };
         if let Some(before) = before {
             // What moved with another switch that passed its threshold there has moved.
             let position = self.switches.position();

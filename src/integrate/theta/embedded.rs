@@ -76,6 +76,25 @@ impl Theta {
         }
     }
 
+    /// Ends the run after so many more steps.
+    pub(crate) fn make_at_most(&mut self, steps: u64) {
+        self.settings.max_steps = self.stats.steps + steps;
+    }
+
+    /// The amplitudes of states and, by what the ports of the present system had, of branches so far: for steps that are made again.
+    pub(crate) fn amplitudes_of_ports(&self) -> Amplitudes {
+        let mut seen = self.amplitudes.clone();
+        let [lambda, y] = &self.smooth.sizes;
+        for (port, (lambda, y)) in self.system().lcs.ports.iter().zip(lambda.iter().zip(y)) {
+            match port.role {
+                Role::Current => seen.see_branch(*y, *lambda),
+                Role::Voltage => seen.see_branch(*lambda, *y),
+                Role::Function => {}
+            }
+        }
+        seen
+    }
+
     /// Whether the steps are those of this module.
     pub(crate) fn is_smooth(&self) -> bool {
         self.control.is_some()

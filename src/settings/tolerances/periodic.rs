@@ -53,7 +53,29 @@ pub(crate) const AT_REST: f64 = 1e-3;
 /// A step away from an unstable orbit, relative to the amplitudes.
 pub(crate) const NUDGE: f64 = 1e-4;
 
-/// Steps of a period where laws are curved; the orbit that is shown has twice as many, and the difference of the two is its error. Larger: time;
+/// The steps of a period where laws are curved keep this part of the tolerance of runs. Larger: orbits that are not found, as what returns lead to is cut by
+/// the steps; smaller: time.
+pub(crate) const ORBIT_TOL: f64 = 0.1;
+
+/// So many such steps a period may take, and so many for each corner of its sources: where error control looks for the digits of a circuit at rest, or for those of a switch that
+/// slides, equal steps take over. Larger: time in vain; smaller: orbits in equal steps, which have no multipliers.
+pub(crate) const LAP_STEPS: f64 = 5e3;
+
+/// See [`LAP_STEPS`].
+pub(crate) const LAP_STEPS_OF_CORNER: f64 = 1e2;
+
+/// The finer steps may be so many times as many.
+pub(crate) const FINER_LAP: f64 = 10.0;
+
+/// An orbit of steps that keep a tolerance is closed to so many times that, as what returns lead to is cut by the choice of the steps. Larger: finer steps begin further from
+/// theirs; smaller: orbits that are not found.
+pub(crate) const COARSE_CLOSED: f64 = 10.0;
+
+/// Those of the orbit that is kept have this part of the tolerance of the first ones, and the difference of the two orbits is the error that is stated. Larger: less is known of it, and
+/// derivatives see where in a step a device turns off; smaller: time.
+pub(crate) const FINER_TOL: f64 = 1e-2;
+
+/// Equal steps of a period where exact integration of straight laws takes too many; the orbit that is kept has twice as many. Larger: time;
 /// smaller: orbits that differ by more than what is asked of a run.
 pub(crate) const PARTS_OF_PERIOD: f64 = 1000.0;
 
