@@ -418,6 +418,35 @@ fn what_is_not_unique_is_named() {
     );
 }
 
+/// The charge of an isolated capacitor, and what the steps of exponential diodes leave open, concern a run that begins on the orbit as well.
+#[test]
+fn a_run_that_begins_on_an_orbit_tells_what_is_not_known_of_it() {
+    let begun = |text: &str| {
+        let model = parsed(text);
+        let (_, start) = orbit_start(&model, &PeriodicOptions::default()).expect("an orbit");
+        let off = start.off;
+        let options = SimOptions {
+            start: Some(start),
+            ..SimOptions::default()
+        };
+        (off, model.transient(options).expect("a run"))
+    };
+    let (off, run) = begun(
+        "* t\nv1 1 0 sin(0 1 1k)\nr1 1 2 1k\nc1 2 0 1u\nc2 3 0 1u ic=5\nr3 3 4 1\nc4 4 0 1u ic=1\n.tran 1u 1m uic\n.end\n",
+    );
+    let told = run.notes.iter().any(|note| note.code == "orbit-not-unique");
+    assert!(told && off == 0.0, "{off:e} {:?}", run.notes);
+    let (off, run) = begun(
+        "* t\nv1 1 0 sin(0 10 1k)\nd1 1 2 d\nc1 2 0 10u\nr1 2 0 1k\n.model d d(is=1e-12)\n.tran 1u 20u\n.end\n",
+    );
+    assert!(off > 0.0 && off < 1e-4, "{off:e}");
+    assert!(
+        run.error.max.is_some_and(|error| error >= off),
+        "{off:e} {:?}",
+        run.error
+    );
+}
+
 #[test]
 fn what_has_no_orbit_is_refused_with_a_reason() {
     let no_orbit = |error: &Error| matches!(error.reason, Reason::NoOrbit(_));

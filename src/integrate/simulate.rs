@@ -146,7 +146,9 @@ pub(crate) fn simulate_beside(
     if let Some((_, _, count)) = known {
         problem.known_comparators = count;
     }
+    let (mut off, mut notes) = (0.0, vec![]);
     if let Some(standing) = start {
+        (off, notes) = (standing.off, standing.notes);
         let place = Place {
             t: standing.t,
             storage: DVector::from_vec(standing.state),
@@ -154,7 +156,16 @@ pub(crate) fn simulate_beside(
         };
         problem = problem.standing_at(place, standing.conducting);
     }
-    drive(problem, tran, options)
+    let mut result = drive(problem, tran, options);
+    let run = match &mut result {
+        Ok(run) => Some(run),
+        Err(error) => error.partial.as_deref_mut(),
+    };
+    if let Some(run) = run {
+        run.error.begins_off(off);
+        run.notes.append(&mut notes);
+    }
+    result
 }
 
 /// Where a run begins in the course of a transient: after the edges of its time.
@@ -170,6 +181,10 @@ pub struct Standing {
     pub conducting: Vec<bool>,
     /// How long before t = 0 sources that repeat have begun to, s: those of an orbit do so for ever.
     pub begun: f64,
+    /// How far the state may be off, in parts of its amplitudes: the run is by no less. Infinite where that is not known.
+    pub off: f64,
+    /// What is to be told of a run that begins here.
+    pub notes: Vec<Note>,
 }
 
 impl Standing {

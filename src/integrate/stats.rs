@@ -289,6 +289,13 @@ pub struct StatedError {
 }
 
 impl StatedError {
+    /// That of a run whose start is off by so much, in parts of the amplitudes; infinitely where it is not known by how much.
+    pub(crate) fn begins_off(&mut self, off: f64) {
+        for error in [&mut self.max, &mut self.rms] {
+            *error = error.map(|error| error.max(off)).filter(|e| e.is_finite());
+        }
+    }
+
     /// Whether the worst value, if it is known, is good for more than its order of magnitude.
     pub(crate) fn is_small(&self) -> bool {
         self.max.is_none_or(|max| max <= IMPRECISE)

@@ -64,46 +64,52 @@ struct Part {
     m: DMatrix<f64>,
 }
 
+/// What the letters stand for: states and what inputs add to them, the law of each port, units, and the position of the switches.
+fn legend(lcs: &Lcs) -> String {
+    let mut out = String::from("x' = A x + B λ + E u + e,  y = C x + D λ + G u + F\n");
+    let _ = writeln!(
+        out,
+        "n = {} states, m = {} ports, p = {} inputs",
+        lcs.n(),
+        lcs.m(),
+        lcs.p()
+    );
+    for (k, s) in lcs.states.iter().enumerate() {
+        let terms: Vec<String> = (0..lcs.p())
+            .filter(|&j| lcs.shift[(k, j)] != 0.0)
+            .map(|j| format!(" + {:e} {}", lcs.shift[(k, j)], lcs.inputs[j].name))
+            .collect();
+        let shift = if terms.is_empty() {
+            String::new()
+        } else {
+            format!("  ({} = x{}{})", s.name, k + 1, terms.concat())
+        };
+        let _ = writeln!(out, "x{} = {} [{}]{shift}", k + 1, s.name, s.unit);
+    }
+    for (k, p) in lcs.ports.iter().enumerate() {
+        let (k, law) = (k + 1, p.law.kind());
+        let _ = writeln!(out, "λ{k} = {}, y{k} = {}: {law}", p.lambda, p.y);
+    }
+    for (k, u) in lcs.inputs.iter().enumerate() {
+        let _ = writeln!(out, "u{} = {} [{}]", k + 1, u.name, u.unit);
+    }
+    for (name, on) in &lcs.switches {
+        let _ = writeln!(out, "switch {name}: {}", if *on { "on" } else { "off" });
+    }
+    out
+}
+
+/// The title and the legend as comments of a script, which its matrices are not told without.
+fn commented(lcs: &Lcs, mark: &str) -> String {
+    let legend = legend(lcs);
+    let lines = std::iter::once(lcs.title.as_str()).chain(legend.lines());
+    lines.map(|line| format!("{mark} {line}\n")).collect()
+}
+
 impl fmt::Display for Lcs {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}", self.title)?;
-        writeln!(f, "x' = A x + B λ + E u + e,  y = C x + D λ + G u + F")?;
-        writeln!(
-            f,
-            "n = {} states, m = {} ports, p = {} inputs",
-            self.n(),
-            self.m(),
-            self.p()
-        )?;
-        for (k, s) in self.states.iter().enumerate() {
-            let terms: Vec<String> = (0..self.p())
-                .filter(|&j| self.shift[(k, j)] != 0.0)
-                .map(|j| format!(" + {:e} {}", self.shift[(k, j)], self.inputs[j].name))
-                .collect();
-            let shift = if terms.is_empty() {
-                String::new()
-            } else {
-                format!("  ({} = x{}{})", s.name, k + 1, terms.concat())
-            };
-            writeln!(f, "x{} = {} [{}]{shift}", k + 1, s.name, s.unit)?;
-        }
-        for (k, p) in self.ports.iter().enumerate() {
-            writeln!(
-                f,
-                "λ{} = {}, y{} = {}: {}",
-                k + 1,
-                p.lambda,
-                k + 1,
-                p.y,
-                p.law.kind()
-            )?;
-        }
-        for (k, u) in self.inputs.iter().enumerate() {
-            writeln!(f, "u{} = {} [{}]", k + 1, u.name, u.unit)?;
-        }
-        for (name, on) in &self.switches {
-            writeln!(f, "switch {name}: {}", if *on { "on" } else { "off" })?;
-        }
+        f.write_str(&legend(self))?;
         for part in parts(self).iter().filter(|p| !p.m.is_empty()) {
             writeln!(f, "{}", part.letter)?;
             table(f, part)?;
@@ -169,7 +175,7 @@ fn names(lcs: &Lcs) -> [(&'static str, Vec<String>); 4] {
 }
 
 fn numpy(lcs: &Lcs) -> String {
-    let mut out = format!("# {}\nimport numpy as np\n", lcs.title);
+    let mut out = commented(lcs, "#") + "import numpy as np\n";
     for (name, list) in names(lcs) {
         let quoted: Vec<String> = list.iter().map(|n| format!("{n:?}")).collect();
         let name = if name == "lambda" { "lambda_" } else { name };
@@ -194,7 +200,7 @@ fn numpy(lcs: &Lcs) -> String {
 }
 
 fn matlab(lcs: &Lcs) -> String {
-    let mut out = format!("% {}\n", lcs.title);
+    let mut out = commented(lcs, "%");
     for (name, list) in names(lcs) {
         let quoted: Vec<String> = list.iter().map(|n| format!("'{n}'")).collect();
         let _ = writeln!(out, "{name} = {{{}}};", quoted.join(", "));
@@ -217,7 +223,8 @@ fn matlab(lcs: &Lcs) -> String {
 }
 
 fn latex(lcs: &Lcs) -> String {
-    let mut out = String::from(
+    let mut out = commented(lcs, "%");
+    out.push_str(
         "\\begin{aligned}\n\\dot x &= A x + B \\lambda + E u + e\\\\\ny &= C x + D \\lambda + G u + F\\\\\n",
     );
     let texts = |list: Vec<String>| {

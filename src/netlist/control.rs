@@ -28,10 +28,10 @@ pub(super) struct Script {
     /// Blocks of loops and conditions that are open.
     blocks: usize,
     runs: usize,
-    /// Values set so far.
-    alters: Vec<Alter>,
+    /// Values and options set so far.
+    set: Vec<Statement>,
     /// Those set before the latest run.
-    before_run: Vec<Alter>,
+    before_run: Vec<Statement>,
     /// Commands that change a run and are not carried out.
     left_out: Vec<(String, Span)>,
 }
@@ -61,16 +61,28 @@ impl Reader<'_> {
                 Ok(Dot::Nothing)
             }
             "reset" => {
-                self.script.alters.clear();
+                let set = &mut self.script.set;
+                set.retain(|statement| !matches!(statement, Statement::Alter(_)));
                 Ok(Dot::Nothing)
             }
             "alter" => {
                 match alter(line).filter(|_| self.script.blocks == 0) {
-                    Some(alter) => self.script.alters.push(alter),
+                    Some(alter) => self.script.set.push(Statement::Alter(alter)),
                     None => self.leave_out("alter", line),
                 }
                 Ok(Dot::Nothing)
             }
+            "option" | "set" => match dot::options(rest) {
+                Dot::Options(options) if !options.read.is_empty() => {
+                    if self.script.blocks == 0 {
+                        self.script.set.extend(options.read);
+                    } else {
+                        self.leave_out(&name.text, line);
+                    }
+                    Ok(Dot::Nothing)
+                }
+                _ => Ok(Dot::Skipped),
+            },
             changing if CHANGING.contains(&changing) => {
                 self.leave_out(changing, line);
                 Ok(Dot::Nothing)
@@ -80,9 +92,10 @@ impl Reader<'_> {
                 Ok(Dot::Skipped)
             }
         };
+        self.keep_findings(&state);
         if matches!(name.text.as_str(), "tran" | "run") {
             self.script.runs += 1;
-            self.script.before_run.clone_from(&self.script.alters);
+            self.script.before_run.clone_from(&self.script.set);
         }
         match parsed {
             Ok(Dot::Statement(statement)) => self.push(*statement),
@@ -106,14 +119,13 @@ impl Reader<'_> {
     pub(super) fn end_script(&mut self) {
         let Script {
             runs,
-            alters,
+            set,
             before_run,
             left_out,
             ..
         } = std::mem::take(&mut self.script);
-        let alters = if runs == 0 { alters } else { before_run };
-        for alter in alters {
-            self.push(Statement::Alter(alter));
+        for statement in if runs == 0 { set } else { before_run } {
+            self.push(statement);
         }
         let Some(&(_, span)) = left_out.first() else {
             return;

@@ -261,7 +261,7 @@ impl Reader<'_> {
         true
     }
 
-    fn keep_findings(&mut self, state: &State) {
+    pub(super) fn keep_findings(&mut self, state: &State) {
         for finding in state.findings.take() {
             self.tell(finding);
         }

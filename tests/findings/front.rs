@@ -270,6 +270,24 @@ fn values_altered_before_the_run_count() {
     assert_eq!(value(&run, "v(c)", 4e-3), 5.0);
 }
 
+/// 1 kΩ are 1.5 kΩ at 77 °C; what cannot be carried out is warned of.
+#[test]
+fn options_of_a_script_are_those_of_cards() {
+    for set in ["option temp=77", "set temp = 77"] {
+        let text = format!(
+            "t\nV1 a 0 5\nR1 a b 1k tc1=1e-2\nR2 b 0 1k\n.options temp=27\n.control\n{set}\ntran 1u 4u\noption temp=127\n.endc\n"
+        );
+        let run = run_text(&text, Method::Exact);
+        assert!((value(&run, "v(b)", 4e-6) - 2.0).abs() < 1e-12, "{set}");
+    }
+    let text = "t\nV1 a 0 5\nR1 a 0 1k\n.control\noption rshunt=1k\ntran 1u 4u\n.endc\n.end\n";
+    let path = std::path::Path::new("t.cir");
+    let read = Ok(text.as_bytes().to_vec());
+    let loaded = circ::netlist::load_read(path, read, &ElaborateOptions::default());
+    let mut said = loaded.diagnostics.iter().map(|d| d.message.as_str());
+    assert!(said.any(|message| message.contains("without `rshunt`")));
+}
+
 /// A triangle, as in ngspice 47.
 #[test]
 fn a_pulse_of_no_width_is_a_triangle() {

@@ -28,7 +28,7 @@ use crate::settings::tolerances::periodic::{
 use attempt::{By, Pace, refined, searched, simulation};
 pub(super) use large::Large;
 use multipliers::{growth, is_dissipative};
-use rows::{Steps, closing_error, next_to_nothing, notes, rows, state_error};
+use rows::{Steps, closing_error, next_to_nothing, notes};
 use search::{Found, Search};
 pub(super) use settled::{Settled, settled, settled_large, settled_linear};
 
@@ -91,9 +91,12 @@ pub fn orbit_start(
 ) -> Result<(Orbit, Standing), Error> {
     let mut settled = settled(model, options)?;
     let standing = settled.standing()?;
+    let (off, notes) = settled.of_start();
     let begins = Standing {
         t: 0.0,
         begun: standing.t,
+        off,
+        notes,
         ..standing
     };
     Ok((settled.orbit(), begins))
@@ -147,7 +150,7 @@ impl Steady {
             step: still.then_some(FINER * orbit.period / PARTS_OF_PERIOD),
             unestimated: found.rests,
         };
-        let mut run = rows(
+        let mut run = rows::rows(
             (&circuit, &multiport, Some(&simulation)),
             standing,
             (orbit.period, steps),
@@ -157,7 +160,7 @@ impl Steady {
         if simulation.is_exact() {
             closing_error(&mut run, &begin, &found.amplitudes);
         } else {
-            state_error(&mut run, apart);
+            run.error.begins_off(apart.unwrap_or(f64::INFINITY));
             if found.rests {
                 run.balanced = false;
                 run.notes.push(next_to_nothing());
@@ -166,6 +169,20 @@ impl Steady {
         run.notes.extend(said);
         run.notes.extend(notes(&orbit, &found.fixed, names, &held));
         Ok((orbit, run))
+    }
+
+    /// How far the orbit may be off, relative to the amplitudes.
+    fn off(&self) -> f64 {
+        let open = self.found.fixed.residual;
+        let open = if open > CLOSED { open } else { 0.0 };
+        self.apart.unwrap_or(f64::INFINITY).max(open)
+    }
+
+    /// What of it concerns what begins on it.
+    fn notes_of_start(&self) -> Vec<Note> {
+        let (orbit, names) = (self.orbit(), self.simulation.state_names());
+        let own = rows::of_start(&orbit, &self.found.fixed, names);
+        self.said.iter().cloned().chain(own).collect()
     }
 
     /// Where the orbit begins, with what conducts there.
@@ -178,7 +195,7 @@ impl Steady {
             state: stand.state.clone(),
             switches: stand.switches.clone(),
             conducting: self.simulation.conducting(),
-            begun: 0.0,
+            ..Standing::default()
         })
     }
 

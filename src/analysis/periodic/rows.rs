@@ -80,13 +80,6 @@ fn shift(run: &mut Run, from: f64) {
         .for_each(|jump| jump.t -= from);
 }
 
-/// The rows of an orbit in steps are off by no less than orbits of longer and shorter steps are apart, and it is not known by what where that is not.
-pub(super) fn state_error(run: &mut Run, apart: Option<f64>) {
-    for error in [&mut run.error.max, &mut run.error.rms] {
-        *error = error.zip(apart).map(|(error, apart)| error.max(apart));
-    }
-}
-
 /// Rows of exact integration are off by no less than they end from where they begin: where steps took over in the search for the orbit, or in them.
 pub(super) fn closing_error(run: &mut Run, begin: &[f64], amplitudes: &[f64]) {
     let ends = run.storage.iter().zip(begin).zip(amplitudes);
@@ -131,11 +124,18 @@ pub(super) fn unstable(orbit: &Orbit) -> Option<Note> {
 pub(super) fn notes(orbit: &Orbit, fixed: &Fixed, names: &[String], held: &[String]) -> Vec<Note> {
     let mut notes = Vec::new();
     notes.extend(held_sources(held));
-    notes.extend(unstable(orbit));
     if fixed.one_sided {
         let text = "the circuit rests with a switch or a device on its threshold: what becomes of small disturbances depends on their sign, and there are no multipliers";
         notes.push(Note::run("rests-on-threshold", text));
-    } else if orbit.kind != OrbitKind::Autonomous {
+    }
+    notes.extend(of_start(orbit, fixed, names));
+    notes
+}
+
+/// What of it concerns what begins on it.
+pub(super) fn of_start(orbit: &Orbit, fixed: &Fixed, names: &[String]) -> Vec<Note> {
+    let mut notes = Vec::from_iter(unstable(orbit));
+    if !fixed.one_sided && orbit.kind != OrbitKind::Autonomous {
         let directions = neutral(&fixed.derivative);
         let taking_part = |j: &usize| directions.iter().any(|direction| direction.contains(j));
         let states: Vec<&str> = (0..names.len())

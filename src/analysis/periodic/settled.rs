@@ -33,6 +33,17 @@ impl Settled {
         }
     }
 
+    /// How far the orbit may be off, relative to the amplitudes, and what of it concerns what begins on it.
+    pub(super) fn of_start(&self) -> (f64, Vec<Note>) {
+        match self {
+            Self::Whole(steady) => (steady.off(), steady.notes_of_start()),
+            Self::Large(large, _, said) => {
+                let notes = said.iter().cloned().chain(large.notes_of_start());
+                (large.off(), notes.collect())
+            }
+        }
+    }
+
     /// The orbit, and one period of it on the grid that `grid` makes of that of the period.
     pub(in crate::analysis) fn on_grid(
         self,

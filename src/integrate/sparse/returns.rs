@@ -107,7 +107,7 @@ impl Returns {
                 state: problem.start.storage.as_slice().to_vec(),
                 switches: sparse.at_first(&problem.start.switches),
                 conducting: problem.conducting.clone(),
-                begun: 0.0,
+                ..Standing::default()
             },
             rest: problem.start.switches.clone(),
             notes: problem.notes.clone(),

@@ -404,7 +404,7 @@ fn left_out(option: &Name) -> Option<Diagnostic> {
 }
 
 /// The options that matter among names with and without values.
-fn options(i: Input<'_>) -> Dot {
+pub(in crate::netlist) fn options(i: Input<'_>) -> Dot {
     let mut options = Options::default();
     let mut at = separator(i);
     while let Ok((rest, name)) = word(at) {

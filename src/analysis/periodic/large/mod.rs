@@ -98,7 +98,7 @@ impl Large {
                 state: shown.stand.state,
                 switches: shown.stand.switches,
                 conducting,
-                begun: 0.0,
+                ..Standing::default()
             },
             apart,
             notes,
@@ -173,6 +173,20 @@ impl Large {
         Tran { uic: true, ..tran }
     }
 
+    /// How far it may be off, relative to the amplitudes.
+    pub(super) fn off(&self) -> f64 {
+        self.apart.unwrap_or(f64::INFINITY)
+    }
+
+    /// What concerns what begins on it.
+    pub(super) fn notes_of_start(&self) -> impl Iterator<Item = Note> + '_ {
+        let own = self
+            .notes
+            .iter()
+            .filter(|note| note.code == "orbit-not-unique");
+        rows::unstable(&self.orbit).into_iter().chain(own.cloned())
+    }
+
     /// Where it begins.
     pub(in crate::analysis) fn standing(&self) -> Standing {
         self.standing.clone()
@@ -185,6 +199,7 @@ impl Large {
         options: &PeriodicOptions<'_>,
         grid: impl FnOnce(Tran) -> Tran,
     ) -> Result<(Orbit, Run), Error> {
+        let off = self.off();
         let options = PeriodicOptions {
             settings: self.settings,
             ..options.clone()
@@ -198,7 +213,7 @@ impl Large {
             &options,
             grid,
         )?;
-        rows::state_error(&mut run, self.apart);
+        run.error.begins_off(off);
         run.plan.push(self.words);
         run.notes.extend(said);
         run.notes.extend(rows::held_sources(held));
