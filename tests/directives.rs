@@ -141,6 +141,28 @@ fn nodeset_chooses_an_operating_point() {
     );
 }
 
+/// Two junctions across a source, without a resistance, carry so much that nothing is left of their voltages: 4.5 V each.
+#[test]
+fn an_operating_point_off_the_laws_of_its_devices_is_told() {
+    let told = |rs: &str| {
+        let text = format!(
+            "vcc vcc 0 9\nvee vee 0 -9\nr1 n0 vee 522\nr3 n2 n1 78.7k\nr4 n2 vee 4.92k\nr5 vee n1 661
+q0 n2 n0 n1 qn\nd0 n0 0 dz\nd1 vcc n0 dz
+.model qn npn(is=4.9e-16 bf=110 br=4)\n.model dz d(is=1e-14 bv=5.1 ibv=20m {rs})\n.op"
+        );
+        let circuit = circuit(&text);
+        let point = operating_point(&circuit, Values::Dc, false, &Settings::default());
+        let point = point.expect("an operating point");
+        let off = (point.nodes[2].1 - 4.5).abs();
+        let told = point.notes.iter().any(|note| note.code == "cancellation");
+        (told, off)
+    };
+    let (without, off) = told("");
+    assert!(without && off > 1e-4, "{off:e}");
+    let (with, off) = told("rs=1");
+    assert!(!with && off < 0.1, "{off:e}");
+}
+
 #[test]
 fn the_temperature_is_a_name_of_expressions() {
     let ohms = |cards: &str| {

@@ -1,5 +1,6 @@
 //! Where a run starts: initial conditions (`uic`) or the operating point.
 
+mod on_laws;
 mod prescribed;
 mod statics;
 
@@ -7,6 +8,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::DVector;
 
+use self::on_laws::off_laws;
 use self::prescribed::{
     Guess, Held, Prescribed, hold_currents, hold_voltages, is_of_integrator, open_inductors,
     read_guesses,
@@ -18,7 +20,7 @@ use crate::integrate::error::{Error, NoRest, Reason};
 use crate::integrate::lawful;
 use crate::integrate::reading::{self, Point};
 use crate::integrate::switching::at_start;
-use crate::lcs::{Hold, Lcs, Position, ReduceError, Role, StorageHold, reduce};
+use crate::lcs::{Hold, Lcs, Port, Position, ReduceError, Role, StorageHold, reduce};
 use crate::mna::{StandardMultiport, StaticMultiport, behaviour};
 use crate::settings::Settings;
 use crate::settings::tolerances::jumps::CONSISTENT;
@@ -216,7 +218,9 @@ fn at_rest(
         if wanted == position {
             notes.extend(point.notes);
             let count = circuit.nodes.len() - 1;
-            let (currents, ties) = point.readings[count..].split_at(circuit.elements.len());
+            let (nodes, others) = point.readings.split_at(count);
+            notes.extend(off_laws(&point.ports, &point.points, nodes));
+            let (currents, ties) = others.split_at(circuit.elements.len());
             let largest = currents.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
             if let Some(k) = (0..ties.len()).find(|&k| ties[k].abs() > CONSISTENT * largest) {
                 let names = feeding(circuit, tied[k]);
@@ -239,7 +243,7 @@ fn at_rest(
             };
             let elements: Vec<String> = circuit.elements.iter().map(|e| e.name.clone()).collect();
             return Ok(OperatingPoint {
-                nodes: named(&circuit.nodes[1..], &point.readings[..count]),
+                nodes: named(&circuit.nodes[1..], nodes),
                 currents: named(&elements, currents),
                 switches: behaviour
                     .switches
@@ -291,6 +295,7 @@ fn waves(circuit: &Circuit, wave: impl Fn(&LinePort) -> f64) -> Vec<[f64; 2]> {
 }
 
 struct Static {
+    ports: Vec<Port>,
     /// By port: whether it conducts.
     conducting: Vec<bool>,
     /// By port: voltage, V, and current, A.
@@ -352,9 +357,10 @@ fn static_solution(
         storage += &lcs.storage.lambda * &lambda;
     }
     let y = &lcs.d * &lambda + &q;
+    let points = reading::points(&lcs, &lambda, &y);
     let ports = lcs.ports.iter().zip(active);
     Ok(Static {
-        points: reading::points(&lcs, &lambda, &y),
+        points,
         conducting: ports
             .map(|(port, active)| active == Some(port.role != Role::Voltage))
             .collect(),
@@ -362,6 +368,7 @@ fn static_solution(
         controls: all(&lcs.controls),
         storage: storage.as_slice().to_vec(),
         notes,
+        ports: lcs.ports.clone(),
     })
 }
 

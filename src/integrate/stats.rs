@@ -7,7 +7,7 @@ use crate::integrate::orbit::Orbit;
 use crate::integrate::rows::RowKind;
 use crate::integrate::verify::Verified;
 use crate::settings::tolerances::jumps::{DESTROYED, NO_JUMP};
-use crate::settings::tolerances::stated::{IMPRECISE, UNBALANCED};
+use crate::settings::tolerances::stated::{IMPRECISE, SELDOM, UNBALANCED};
 use crate::waveform::Waveforms;
 
 /// Counters of one run; deterministic except `cpu_seconds`.
@@ -299,6 +299,11 @@ impl StatedError {
     /// Whether the worst value, if it is known, is good for more than its order of magnitude.
     pub(crate) fn is_small(&self) -> bool {
         self.max.is_none_or(|max| max <= IMPRECISE)
+    }
+
+    /// Whether the worst value, however large its error, is one of few.
+    pub(crate) fn is_of_single_rows(&self) -> bool {
+        self.rms.is_some_and(|rms| rms <= SELDOM)
     }
 
     /// That of two runs together: known where both are.

@@ -219,13 +219,19 @@ pub fn warnings(run: &Run) -> Vec<Note> {
     warnings.into_iter().flatten().collect()
 }
 
-/// A stated error that is a good part of what is shown.
+/// A stated error that is a good part of what is shown: of single rows, or of so many that the run is of no use.
 fn imprecise(run: &Run) -> Option<Note> {
     let error = run.error.max.filter(|_| !run.error.is_small())?;
-    let text = format!(
-        "the error of this run may be {} of the amplitudes: its values are not to be relied on",
-        si::plain(error, 2)
-    );
+    let error = si::plain(error, 2);
+    let text = match run.error.rms {
+        Some(rms) if run.error.is_of_single_rows() => format!(
+            "single rows may be off by {error} of the amplitudes, as beside edges that come a little early or late; root mean squares of the error are {} at most",
+            si::plain(rms, 2)
+        ),
+        _ => format!(
+            "the error of this run may be {error} of the amplitudes: its values are not to be relied on"
+        ),
+    };
     Some(Note::run("imprecise", text))
 }
 
@@ -435,18 +441,31 @@ mod tests {
 
     #[test]
     fn a_large_stated_error_is_a_warning() {
-        let stating = |max| Run {
+        let stating = |max, rms| Run {
             error: StatedError {
                 max,
+                rms,
                 ..StatedError::default()
             },
             ..Run::default()
         };
-        for (max, warned) in [(None, false), (Some(0.05), false), (Some(0.4), true)] {
-            let warnings = warnings(&stating(max));
-            let found = warnings.iter().any(|note| note.code == "imprecise");
-            assert_eq!(found, warned, "{max:?}");
+        let said = |max, rms| {
+            let notes = warnings(&stating(max, rms)).into_iter();
+            let mut found = notes.filter(|note| note.code == "imprecise");
+            found.next().map(|note| note.text)
+        };
+        for max in [None, Some(0.05)] {
+            assert_eq!(said(max, None), None, "{max:?}");
         }
+        for rms in [None, Some(0.2)] {
+            let text = said(Some(0.4), rms).expect("a warning");
+            assert!(text.ends_with("not to be relied on"), "{text}");
+        }
+        let text = said(Some(0.4), Some(0.002)).expect("a warning");
+        assert!(
+            text.starts_with("single rows may be off by 0.4 of"),
+            "{text}"
+        );
     }
 
     #[test]

@@ -4,12 +4,12 @@ use super::period::Period;
 use super::search::{Found, Search};
 use super::{PeriodicOptions, none};
 use crate::circuit::{Circuit, Tran};
-use crate::integrate::{Error, Method, Reason, Simulation, SimulationOptions};
+use crate::integrate::{Error, Method, Note, Reason, Simulation, SimulationOptions};
 use crate::mna::{SourcePort, StaticMultiport};
 use crate::settings::Settings;
 use crate::settings::tolerances::periodic::{
-    FINER, FINER_LAP, FINER_TOL, LAP_STEPS, LAP_STEPS_OF_CORNER, LONGEST_SEARCH, ORBIT_TOL,
-    PARTS_OF_PERIOD, TABLE_STEPS,
+    FINER, FINER_TOL, LAP_STEPS, LAP_STEPS_OF_CORNER, LONGEST_SEARCH, ORBIT_TOL, PARTS_OF_PERIOD,
+    TABLE_STEPS,
 };
 
 /// What orbits are followed by.
@@ -57,8 +57,49 @@ impl Pace<'_> {
     }
 }
 
-/// The orbit that a search comes to, and a simulation that follows it.
+/// The orbit that a search comes to, with a simulation that follows it, and what they are found by: the plan of the circuit, or equal steps where a circuit of curved laws rests, of whose
+/// leakage and rounding a tolerance would have digits looked for, and where the plan finds none, of which a note is `said`.
 pub(super) fn searched(
+    parts: (&Circuit, &StaticMultiport),
+    period: &Period,
+    options: &PeriodicOptions<'_>,
+    said: &mut Vec<Note>,
+) -> Result<(By, (Simulation, Found)), Error> {
+    let curved = parts.0.is_curved();
+    let planned = searched_by(parts, period, By::PLAN, options);
+    let others = match &planned {
+        Ok((simulation, found)) => curved && found.rests && !simulation.is_exact(),
+        Err(error) => {
+            let too_many = matches!(error.reason, Reason::TooManySteps { .. });
+            !error.is_interruption() && (curved || too_many)
+        }
+    };
+    let by = By::equal(if curved { Method::Auto } else { Method::Theta });
+    if others
+        && let Ok(other) = searched_by(parts, period, by, options)
+        && (other.1.rests || planned.is_err())
+    {
+        let failed = planned.err().filter(|_| !other.1.rests);
+        said.extend(failed.map(|error| instead(curved, &error)));
+        return Ok((by, other));
+    }
+    Ok((By::PLAN, planned?))
+}
+
+/// Equal steps had to do, as the plan of the circuit found no orbit.
+fn instead(curved: bool, error: &Error) -> Note {
+    let plan = if curved {
+        "steps that keep a tolerance"
+    } else {
+        "exact integration"
+    };
+    let text = format!(
+        "the orbit was found in {PARTS_OF_PERIOD} equal steps a period instead of by {plan}; they damp what swings faster and miss how devices turn off within them, so that there are no multipliers: {error}"
+    );
+    Note::run("steps-instead", text)
+}
+
+fn searched_by(
     parts: (&Circuit, &StaticMultiport),
     period: &Period,
     by: By,
@@ -155,7 +196,7 @@ pub(super) fn simulation(
                 let corners = |port: &SourcePort| port.input.source.wave.corners(span);
                 let corners: f64 = multiport.sources.iter().map(corners).sum();
                 let most = LAP_STEPS + LAP_STEPS_OF_CORNER * corners;
-                let most = if finer { FINER_LAP * most } else { most };
+                let most = most * (ORBIT_TOL * Settings::default().tol / tol).sqrt();
                 let most = (most as u64).min(options.settings.max_steps);
                 return Simulation::lapping(&circuit, multiport, options, (span, most), like);
             }

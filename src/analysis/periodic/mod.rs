@@ -17,7 +17,7 @@ use std::sync::atomic::AtomicBool;
 use super::variation::{Course, Linearised, Trajectory};
 use crate::circuit::{Circuit, Element, Kind, Source, Tran};
 use crate::integrate::exact::Corners;
-use crate::integrate::{Error, Method, Note, Orbit, OrbitKind, Reason, Run, Simulation, Standing};
+use crate::integrate::{Error, Note, Orbit, OrbitKind, Reason, Run, Simulation, Standing};
 use crate::mna::{StaticMultiport, behaviour};
 use crate::model::Model;
 use crate::settings::Settings;
@@ -130,7 +130,7 @@ impl Steady {
         options: &PeriodicOptions<'_>,
         grid: impl FnOnce(Tran) -> Tran,
     ) -> Result<(Orbit, Run), Error> {
-        let standing = self.standing()?;
+        let (standing, off) = (self.standing()?, self.off());
         let begin = standing.state.clone();
         let Self {
             circuit,
@@ -140,7 +140,7 @@ impl Steady {
             simulation,
             by,
             found,
-            apart,
+            ..
         } = self;
         let (names, orbit) = (simulation.state_names(), found.orbit());
         // Nothing moves, or what leakage and rounding leave does: an error control would look for its digits.
@@ -160,7 +160,7 @@ impl Steady {
         if simulation.is_exact() {
             closing_error(&mut run, &begin, &found.amplitudes);
         } else {
-            run.error.begins_off(apart.unwrap_or(f64::INFINITY));
+            run.error.begins_off(off);
             if found.rests {
                 run.balanced = false;
                 run.notes.push(next_to_nothing());
@@ -479,44 +479,11 @@ fn whole(asked: Asked, options: &PeriodicOptions<'_>) -> Result<Steady, Error> {
         multiport,
         period,
         held,
-        said,
+        mut said,
     } = asked;
     let parts = (&circuit, &multiport);
-    let mut said = said;
-    let (mut by, mut made) = (By::PLAN, searched(parts, &period, By::PLAN, options));
-    let curved = circuit.is_curved();
-    let equal = By::equal(if curved { Method::Auto } else { Method::Theta });
-    match &made {
-        // A tolerance would have digits of leakage and rounding looked for.
-        Ok((simulation, found)) if found.rests && curved && !simulation.is_exact() => {
-            let other = searched(parts, &period, equal, options);
-            if let Ok((_, Found { rests: true, .. })) = &other {
-                (by, made) = (equal, other);
-            }
-        }
-        Err(error)
-            if !error.is_interruption()
-                && (curved || matches!(error.reason, Reason::TooManySteps { .. })) =>
-        {
-            if let Ok(other) = searched(parts, &period, equal, options) {
-                if !other.1.rests {
-                    let instead = if curved {
-                        "steps that keep a tolerance"
-                    } else {
-                        "exact integration"
-                    };
-                    let text = format!(
-                        "the orbit was found in {PARTS_OF_PERIOD} equal steps a period instead of by {instead}; they damp what swings faster and miss how devices turn off within them, so that there are no multipliers: {error}"
-                    );
-                    said.push(Note::run("steps-instead", text));
-                }
-                (by, made) = (equal, Ok(other));
-            }
-        }
-        _ => {}
-    }
-    let (mut simulation, mut found) = made?;
-    found.underived = by.equal && !(curved && found.rests);
+    let (by, (mut simulation, mut found)) = searched(parts, &period, options, &mut said)?;
+    found.underived = by.equal && !(circuit.is_curved() && found.rests);
     let apart = if simulation.is_exact() {
         Some(0.0)
     } else {

@@ -82,8 +82,8 @@ pub(super) const CODES: [Explanation; 63] = [
     .shown("a source decides\nv1 a 0 5\nr1 a b 1k\nc1 b 0 1u\n.ic v(a)=3\n.tran 10u 1m\n"),
     Explanation::of(
         "imprecise",
-        "The error that the run states for itself is a good part of the amplitudes.",
-        "Steps that are too long (`--step`, or a large `--tol`), or a transient that no step follows, such as a transistor that interrupts the current of an inductor.",
+        "The error that the run states for itself is a good part of the amplitudes, in single rows or for good.",
+        "Steps that are too long (`--step`, or a large `--tol`), or a transient that no step follows, such as a transistor that interrupts the current of an inductor; of single rows: a diode that turns off between them, a little earlier or later.",
         "A smaller `--step` or `--tol`, and `--verify`; where that changes nothing, a path for the current (a freewheeling diode, a capacitance).",
     ),
     Explanation::of(

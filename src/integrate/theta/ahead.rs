@@ -135,17 +135,17 @@ impl Theta {
         }
     }
 
-    /// The length of the next step and its end: whole lengths, the rest before a stop in one or two.
+    /// The length of the next step and its end, which times tell from now: whole lengths, the rest before a stop in one or two.
     fn next_step(&mut self, stop: f64) -> (f64, f64) {
         let now = self.now.t;
-        let rest = stop - now;
-        let h = self.preferred.min(self.longest_step());
+        let (rest, slack) = (stop - now, Self::slack(now));
+        let h = self.preferred.min(self.longest_step()).max(slack);
         self.smooth.cut = false;
         if rest <= h * (1.0 + WHOLE) {
             // A coarser run makes it whole.
             let cut = !self.whole && rest < CUT * h && self.smooth.uncut != stop;
             self.smooth.cut = cut;
-            if self.whole || cut || self.smooth.halved == stop {
+            if self.whole || cut || self.smooth.halved == stop || rest <= 2.0 * slack {
                 return (rest, stop);
             }
             self.smooth.halved = stop;
@@ -185,5 +185,34 @@ impl Theta {
         }
         self.report(log);
         Ok(switches)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::dvector;
+
+    use crate::integrate::fixtures;
+    use crate::integrate::step::Scheme;
+    use crate::integrate::theta::Stepping;
+    use crate::integrate::theta::tests::stepper;
+
+    /// Errors that ask for steps shorter than times tell apart have them as short as times do.
+    #[test]
+    fn a_step_ends_later_than_it_begins() {
+        let stepping = Stepping::Controlled {
+            span: 1.0,
+            first: 1e-3,
+        };
+        let lcs = fixtures::rlcd();
+        let mut theta = stepper(&lcs, dvector![10.0, 0.0], Scheme::MIDPOINT, stepping);
+        theta.now.t = 1.0;
+        for stop in [1.0 + f64::EPSILON, 1.0 + 20.0 * f64::EPSILON, 2.0] {
+            for preferred in [0.0, 1e-30, 1e-17, f64::EPSILON, 0.1] {
+                (theta.preferred, theta.smooth.halved) = (preferred, f64::NEG_INFINITY);
+                let (h, end) = theta.next_step(stop);
+                assert!(h > 0.0 && 1.0 < end && end <= stop, "{h:e} to {end:e}");
+            }
+        }
     }
 }

@@ -57,15 +57,12 @@ pub(crate) const NUDGE: f64 = 1e-4;
 /// the steps; smaller: time.
 pub(crate) const ORBIT_TOL: f64 = 0.1;
 
-/// So many such steps a period may take, and so many for each corner of its sources: where error control looks for the digits of a circuit at rest, or for those of a switch that
-/// slides, equal steps take over. Larger: time in vain; smaller: orbits in equal steps, which have no multipliers.
+/// So many such steps a period may take at the default tolerance, and at another one that times the root of their ratio: where error control looks for the digits of a circuit at rest, or for
+/// those of a switch that slides, equal steps take over. Larger: time in vain; smaller: orbits in equal steps, which have no multipliers.
 pub(crate) const LAP_STEPS: f64 = 5e3;
 
-/// See [`LAP_STEPS`].
+/// So many more for each corner of the sources, after which steps begin short. Larger and smaller as [`LAP_STEPS`].
 pub(crate) const LAP_STEPS_OF_CORNER: f64 = 1e2;
-
-/// The finer steps may be so many times as many.
-pub(crate) const FINER_LAP: f64 = 10.0;
 
 /// An orbit of steps that keep a tolerance is closed to so many times that, as what returns lead to is cut by the choice of the steps. Larger: finer steps begin further from
 /// theirs; smaller: orbits that are not found.

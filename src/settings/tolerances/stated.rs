@@ -8,6 +8,10 @@ pub(crate) const UNBALANCED: f64 = 1e-3;
 /// of no use passes as a result; smaller: runs in few long steps, which are made to be looked at, are warned of.
 pub(crate) const IMPRECISE: f64 = 0.1;
 
+/// Root mean square of the stated error, relative to the amplitudes, up to which a warning says that a larger one is that of single rows. Larger: what is off for good is
+/// called an edge; smaller: a converter whose diodes turn off between rows is called useless.
+pub(crate) const SELDOM: f64 = 1e-2;
+
 /// An error that is no small part of the amplitudes is told but roughly by what runs differ: it is stated larger by the part of [`IMPRECISE`] that it is, at
 /// most so many times. Larger: what is of no use is stated larger than it is; smaller: the statement no longer bounds such errors (`tests/stated/`).
 pub(crate) const ROUGHLY: f64 = 4.0;
